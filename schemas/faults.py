@@ -136,3 +136,12 @@ class ServerRestarted(OutcomeUnknown):
 
 class NeverEnded(OutcomeUnknown):
     """The server was asked to end the request, and has not."""
+
+
+def bug(error: BaseException, where: str, service: str) -> Fault:
+    """Make the fault of an exception that nobody foresaw. where: what was being done. service: where it shows."""
+    try:
+        reason = error.fault.reason if isinstance(error, EngageError) else f"{type(error).__name__}: {error}"
+    except Exception:  # the error's own __str__ raises
+        reason = type(error).__name__
+    return Fault(reason=reason, where=where, advice="this is a bug: the log has its traceback", service=service)

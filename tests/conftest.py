@@ -46,8 +46,9 @@ pytest_plugins = ["engage_hri.services.control.testing.plugin"]
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """One worker more than processors: many tests wait for processes of their own."""
-    return len(os.sched_getaffinity(0)) + 1 if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1) + 1
+    """One worker more than processors where tests wait for processes of their own, as the long share does."""
+    processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return processors if config.option.markexpr == "not long" else processors + 1
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -55,7 +56,7 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line(
         "markers", "each_bus: runs on each kind of bus (shared=False: not with one session for all)"
     )
-    config.addinivalue_line("markers", "long: left to `make test-long` (set by conftest: tests/long_share.py)")
+    config.addinivalue_line("markers", "long: left to `make test-all` (set by conftest: tests/long_share.py)")
     config.pluginmanager.register(Left(config), "left")
     if not hasattr(config, "workerinput"):
         config.pluginmanager.register(Skips(), "skips")
@@ -65,7 +66,8 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark the long share before `-m` is judged. Long files first: whoever gets the last ends soon after others."""
     for item in items:
-        if is_long(item.path, real_time=item.get_closest_marker("real_time") is not None):
+        test = item.nodeid.partition("::")[2]
+        if is_long(item.path, test, real_time=item.get_closest_marker("real_time") is not None):
             item.add_marker("long")
     places = {config.rootpath / "tests" / name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: places.get(item.path, len(places)))

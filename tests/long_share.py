@@ -1,4 +1,4 @@
-"""Which tests `make test` leaves to `make test-long`, and why.
+"""Which tests `make test` leaves to `make test-all`, and why.
 
 People run `make test` after each small change, and wait for it. It must take minutes, so most of it runs in one
 process and in virtual time. The long share is the rest: the operating system, sockets, browsers and packages.
@@ -9,6 +9,7 @@ below. A test that is not long and starts a process fails, unless its file is in
 processes makes `make test` slow unseen.
 """
 
+import re
 import subprocess
 import traceback
 from collections.abc import Iterator
@@ -31,7 +32,6 @@ LONG = {
     "control/test_unread_scripts.py": "eSpeak NG speaks, in a process",
     "control/test_voice_outlets.py": "loudspeakers are programs of the system",
     "control/test_voice_recognized.py": "eSpeak NG speaks, and a recognizer listens",
-    "recording/test_pictures.py": "it draws pictures and films of recordings, and has ffmpeg write them",
     "control/mujoco/test_described_contract.py": "another robot on the driver that test_mujoco_contract.py has",
     "scenario/test_raw_perception.py": "whole tasks seen by cameras; recognition/ has the parts",
     "recording/test_commands_on_damage.py": "each command on each damage; test_damage.py has what reading finds",
@@ -42,17 +42,108 @@ LONG = {
     "access/test_table.py": "each row of the table over real sockets; test_denials.py has what a router tells",
     "recording/test_conditions.py": "a whole session with conditions",
     "recording/test_in_the_window.py": "a whole session in the window, compared at each jump",
-    "recording/test_annotation_files.py": "a whole session as files for ELAN and Praat, and a film",
+    "recording/test_annotation_files.py": "a whole session as a file for ELAN",
     "recording/test_tiers_at_random.py": "a whole session against an oracle; test_tiers.py has the rules",
     "recording/test_window_oracle.py": "a whole session against an oracle; test_player.py has the rules",
     "simulation/test_stochastic_task.py": "whole tasks with a person drawn by chance",
     "test_skips.py": "each test runs pytest; it guards a tool and not the robot",
+    "cli/test_simulate.py": "whole tasks in processes of their own; study/ has what is made of them",
+    "control/mujoco/test_beside.py": "another robot in physics; test_mujoco_contract.py has all laws",
+    "control/mujoco/test_chosen_again.py": "whole fragments in physics",
+    "control/mujoco/test_faults.py": "each fault in physics; test_mujoco_contract.py has all laws",
+    "control/mujoco/test_limits.py": "random faults in physics",
+    "control/mujoco/test_small_robots.py": "other robots in physics; test_mujoco_contract.py has all laws",
+    "control/mujoco/test_turns.py": "each slice of inverse kinematics",
     "control/mujoco/test_pictures.py": "it draws films of physics, and has ffmpeg write them",
 }
 """Files and folders whose tests are long though they are not marked `real_time`, with the reason."""
 
+LONG_TESTS = {
+    "access/test_denials.py": {
+        "test_who_sends_a_great_deal_that_is_allowed_is_told_by_name_in_the_first_tenth_and_hundredth_second": (
+            "a hundred seconds of a full router"
+        ),
+    },
+    "cli/test_console.py": {
+        "test_a_demo_is_recorded": "a whole task",
+    },
+    "cli/test_demo.py": {
+        "test_a_misplaced_piece_is_asked_for_again": "a whole task; test_appendix_b.py has it, too",
+        "test_another_seed_gives_other_times_but_the_same_story_and_quiet_prints_nothing": "a whole task",
+        "test_lines_on_stdout_leave_it_to_them": "a whole task",
+        "test_the_resolution_decides_what_counts_as_shared": "a whole task; test_appendix_b.py has it, too",
+    },
+    "cli/test_formats.py": {
+        "test_commands_write_formats_as_utf8": "each command in a process of its own",
+    },
+    "cli/test_new_body.py": {
+        "test_it_writes_a_driver_that_keeps_the_contract_and_says_what_is_next": "all laws by the command",
+    },
+    "control/reachy_mini/test_contract.py": {
+        "TestLivingReachyMini": "the laws again, while it breathes",
+        "TestNoisyReachyMini": "the laws again, with noise",
+    },
+    "control/test_calibration.py": {
+        "test_as_many_as_are_said_lie_within_the_stated_error": "many calibrations",
+    },
+    "control/test_composed.py": {
+        "TestApart": "the same body in other parts; TestComposedBody has all laws",
+    },
+    "control/test_silent_voice.py": {
+        "TestTorsoWithSilentVoice": "the laws of the torso again, with another voice",
+    },
+    "control/test_liars.py": {
+        "test_who_breaks_a_law_is_caught_by_it": "a body for each law; it guards the suite",
+    },
+    "docs/test_making_pages.py": {
+        "test_arrows_point_down_and_boxes_keep_apart": "it draws all pictures of the site",
+    },
+    "hostile/test_attacks.py": {
+        "test_the_same_seed_does_the_same": "two attacks; it guards a tool",
+    },
+    "realizer/test_slices.py": {
+        "test_no_slice_of_planning_is_long": "each shape of a large block under a profiler",
+    },
+    "recognition/test_crowd.py": {
+        "test_what_is_kept_does_not_grow_with_those_who_have_passed": "thousands of people",
+    },
+    "recording/test_again.py": {
+        "test_raw_perception_gives_the_same_events": "a whole task seen by cameras",
+    },
+    "recording/test_analyse.py": {
+        "test_the_numbers_of_a_recording_are_those_of_the_live_run": "a whole task, by chance",
+    },
+    "recording/test_replay.py": {
+        "test_a_whole_task_comes_again_message_for_message": "a whole task; the others of the file have the rules",
+    },
+    "requests/test_requests.py": {
+        "test_a_desk_forgets_the_oldest_ended_requests_of_who_sends_many_and_no_live_one": "thousands of requests",
+        "test_ten_thousand_requests_at_once_come_as_the_server_keeps_up_each_once_and_in_order": "so many",
+    },
+    "scenario/test_appendix_b.py": {
+        "test_everybody_looks_where_the_transcript_says[3]": "the task with another seed",
+        "test_the_same_seed_gives_the_same_run_and_another_seed_the_same_events": (
+            "the task again, and with another seed; test_demo.py has the same seed"
+        ),
+        "test_the_task_finishes_the_figure_with_a_person_who_listens": "another whole task",
+    },
+    "scenario/test_words.py": {
+        "test_all_that_the_simulated_person_says_are_words_of_events": "whole tasks, by chance",
+    },
+    "study/test_plots.py": {
+        "test_all_plots_are_drawn": "it draws with Matplotlib",
+    },
+    "test_shares.py": {
+        "test_a_process_that_nobody_has_marked_is_red_and_what_is_left_out_is_told": "it runs pytest",
+    },
+}
+"""The same of single tests, classes of tests, or cases, by file."""
+
 SMOKE = "cli/test_smoke.py"
 """The one file of real processes that stays short: without it a robot that does not start at all would pass."""
+
+REAL_TIME = re.compile(r"^pytestmark = .*\breal_time\b", re.MULTILINE)
+"""What marks a whole file."""
 
 SHORT_PROCESSES: dict[str, str] = {
     SMOKE: "it is what real processes do at the least",
@@ -65,16 +156,26 @@ SHORT_PROCESSES: dict[str, str] = {
     "control/test_liars.py": "it asks pytest once, and no robot",
     "control/test_offers.py": "it asks Python once what a package on the path offers",
     "docs/test_changes.py": "it asks towncrier thrice, and no robot",
-    "recording/test_annotation_files.py": "it has ffmpeg write a film of an instant",
     "runtime/test_installation.py": "it asks Python once where a package is",
 }
 """Files of the short share that may start processes, with the reason."""
 
 
-def is_long(path: Path, *, real_time: bool) -> bool:
-    """Whether a test in this file belongs to the long share."""
-    name = path.relative_to(TESTS).as_posix()
-    return name != SMOKE and (real_time or any(name == each or name.startswith(f"{each}/") for each in LONG))
+def is_long(path: Path, test: str, *, real_time: bool) -> bool:
+    """Whether a test belongs to the long share. test: its name in the file, perhaps with its case in brackets."""
+    name, whole = path.relative_to(TESTS).as_posix(), test.partition("[")[0]
+    named = {test, whole, whole.partition("::")[0]}
+    is_named = is_long_file(path) or not named.isdisjoint(LONG_TESTS.get(name, ()))
+    return name != SMOKE and (real_time or is_named)
+
+
+def is_long_file(path: Path) -> bool:
+    """Whether all tests of this file, or folder, belong to the long share, as is known without loading it."""
+    if not path.is_relative_to(TESTS) or path == TESTS / SMOKE:
+        return False
+    file = path.relative_to(TESTS)
+    is_named = any(each.as_posix() in LONG for each in (file, *file.parents))
+    return is_named or (path.name.startswith("test_") and REAL_TIME.search(path.read_text("utf-8")) is not None)
 
 
 def _is_importing() -> bool:
@@ -111,24 +212,37 @@ class Started:
 
 
 class Left:
-    """Tells in one line how many tests `-m "not long"` has left out, also where only workers know it."""
+    """Tells in one line how much `-m "not long"` has left out, also where only workers know it.
+
+    Files that are long as a whole are not even loaded: that is a fifth of what loading all costs.
+    """
 
     def __init__(self, config: pytest.Config) -> None:
-        self.number, self._asked = 0, "long" in config.option.markexpr
+        self.tests, self.files, self._asked = 0, 0, config.option.markexpr == "not long"
+
+    def pytest_ignore_collect(self, collection_path: Path) -> bool | None:
+        """Never asked for what is named on the command line."""
+        if not self._asked or collection_path == TESTS or not is_long_file(collection_path):
+            return None
+        self.files += len([*collection_path.rglob("test_*.py")]) if collection_path.is_dir() else 1
+        return True
 
     def pytest_deselected(self, items: list[pytest.Item]) -> None:
         if self._asked:
-            self.number += sum(item.get_closest_marker("long") is not None for item in items)
+            self.tests += sum(item.get_closest_marker("long") is not None for item in items)
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         if hasattr(session.config, "workeroutput"):
-            session.config.workeroutput["left"] = self.number
+            session.config.workeroutput["left"] = self.tests, self.files
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_testnodedown(self, node: Any) -> None:
         """Each worker has the same tests."""
-        self.number = max(self.number, getattr(node, "workeroutput", {}).get("left", 0))
+        self.tests, self.files = getattr(node, "workeroutput", {}).get("left", (self.tests, self.files))
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        if self.number:
-            terminalreporter.write_line(f"{self.number} tests are left to `make test-long` (tests/long_share.py)")
+        if self.tests or self.files:
+            files = f" and {self.files} whole files" if self.files else ""
+            terminalreporter.write_line(
+                f"{self.tests} tests{files} are left to `make test-all` (tests/long_share.py)"
+            )

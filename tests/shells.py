@@ -6,11 +6,9 @@ SHELLS = {
     "services/realizer/perform/presence.py",  # wakes who waits for a service
     "services/realizer/perform/recognition_link.py",  # asks recognition
     "services/control/serving/state_publisher.py",  # publishes what the body shows
-    "services/control/serving/behavior_task.py",  # breaks off what a body does not end
     "services/control/serving/questions.py",  # answers what behaviors would take
     "services/control/serving/estimates.py",  # publishes mistakes of the body
     "services/control/serving/warnings_told.py",  # publishes what a person has to see to
-    "services/control/serving/fault_switch.py",  # publishes the faults that are on
     "services/control/bases/driver_guard.py",  # times the calls of drivers by the clock of the loop
     "services/realizer/report/feedback.py",  # publishes feedback
     "services/realizer/perform/behavior_run.py",  # awaits sync points
@@ -21,16 +19,13 @@ SHELLS = {
     "services/realizer/perform/net_stream.py",  # publishes the marking
     "services/realizer/perform/steering.py",  # holds, continues and stops
     "services/realizer/together/live.py",  # resolved when a block has ended
-    "services/generation/body_link.py",  # asks the body
-    "services/generation/fragment_runner.py",  # awaits the blocks of fragments
     "services/control/contract/body.py",  # the interface of bodies: coroutines
     "services/control/bases/one_part_motion.py",  # a body that moves on the loop's clock
     "services/control/bases/setpoints.py",  # set points on the loop's clock
     "services/control/bases/walk.py",  # walks through sync points on the loop's clock
     "services/control/bases/composed.py",  # takes several bodies home at once
-    "services/control/mujoco/film.py",  # hands pictures to ffmpeg
+    "services/control/mujoco/film.py",  # takes pictures by the clock of the loop
     "services/control/mujoco/pulse.py",  # steps of a physics on loop time
-    "services/control/reachy_mini/body.py",  # a body that moves on the loop's clock
     "services/control/reachy_mini/link.py",  # keeps the connection to the robot
     "services/control/reachy_mini/connection.py",  # HTTP and WebSockets
     "services/control/voice/player.py",  # runs the program that plays
@@ -40,7 +35,6 @@ SHELLS = {
     "services/control/contract/bell.py",  # waits for a moment or a change of authority
     "services/console/web/sessions.py",  # ends sessions whose page does not come back
     "services/recording/replay.py",  # says what was said
-    "services/recording/disk.py",  # times the disk
     "services/simulation/still.py",  # a world, published once
     "services/console/follow.py",  # subscribes
     "services/console/terminal/live.py",  # draws

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from functools import cache, lru_cache
 from math import inf
 from pathlib import Path, PurePosixPath
+from typing import NamedTuple
 
 import pytest
 
@@ -52,9 +53,9 @@ PURE_SHARED = {"recording", "reports", "tangram", "text"}
 """Those of them whose files are pure, as those of a service are."""
 KNOW_TANGRAM = (
     "services/tangram/", "services/control/mujoco/", "services/commandline/shell/config.py",
-    "services/commandline/embedding.py", "services/commandline/study/",
+    "services/commandline/embedding.py",
 )  # fmt: skip
-"""The example itself, the physics whose room has its table, its sections of a configuration, and the studies of it.
+"""The example itself, the physics whose room has its table, its sections of a configuration, and `embedded`.
 The core knows no tangram: docs/decisions/0145."""
 LAYERS = {
     "schemas": "documents > *",
@@ -63,12 +64,12 @@ LAYERS = {
     "services/text": "ear > marks > pieces > patterns > acts ends listening > abbreviations",
     "services/bus": "memory zenoh > answering > interface > payloads subscription > samples often sight"
     " > config journal keyring",
-    "services/control": "mujoco > reachy_mini service testing torso > bases calibrating figure serving voice"
+    "services/control": "mujoco > reachy_mini service testing torso > bases calibrating serving > figure voice"
     " > contract > config motion",
     "services/commandline": "look robot study talk > app bodies embedding > shell",
     "services/client": "language_models > robot > hearing > studied > faulting > feeds people > chunking event_stream"
     " inputs results steering",
-    "services/generation": "service > fragment_runner > performance > body_link choosing_again"
+    "services/generation": "service > intake > fragments > performance > body_link choosing_again ways > exchange"
     " fragment_check > acts lost pipeline > block head names > references turns > permits > config",
     "services/realizer": "service > perform > export together > report > decide > foresee > plan > net"
     " > config points",
@@ -103,10 +104,10 @@ def violations(path: str, text: str) -> list[str]:
     found = list(_in_any_text(path, text))
     place = PurePosixPath(path)
     if place.suffix == ".py" and place.parts[0] in CODE:
-        tree = ast.parse(text)
+        tree = _tree(text)
         found += _in_code(place, text, tree)
         if place.parts[0] == "tests":
-            found += _in_tests(place, tree)
+            found += _in_tests(place, text, tree)
     return [f"{path}: {violation}" for violation in found]
 
 
@@ -214,14 +215,17 @@ def _is_pure(place: PurePosixPath) -> bool:
     )
 
 
-def _in_tests(place: PurePosixPath, tree: ast.Module) -> Iterator[str]:
+def _in_tests(place: PurePosixPath, text: str, tree: ast.Module) -> Iterator[str]:
     if "time.sleep" in set(_imports(place, tree)):
         yield "imports time.sleep: wait for something"
     for line in _sleeps(tree, "time.sleep"):
         yield f"line {line} sleeps on the wall clock: wait for something"
+    if "real_time" not in text:
+        return
     whole_file = any("real_time" in ast.unparse(node) for node in tree.body if isinstance(node, ast.Assign))
-    for function in _nodes(tree):
-        if isinstance(function, ast.AsyncFunctionDef | ast.FunctionDef):
+    functions = (node for node in _nodes(tree) if isinstance(node, ast.AsyncFunctionDef | ast.FunctionDef))
+    for function in functions:
+        if any(_sleeps(function, "asyncio.sleep")):
             real = whole_file or any("real_time" in ast.unparse(mark) for mark in function.decorator_list)
             for line in _sleeps(function, "asyncio.sleep") if real else ():
                 yield f"line {line} sleeps on the wall clock: wait for something"
@@ -230,8 +234,9 @@ def _in_tests(place: PurePosixPath, tree: ast.Module) -> Iterator[str]:
 def _sleeps(tree: ast.AST, name: str) -> Iterator[int]:
     """Lines of calls that really wait; `sleep(0)` only lets others run."""
     for node in _nodes(tree):
-        called = isinstance(node, ast.Call) and ast.unparse(node.func) == name
-        if called and ast.unparse(node.args[0]) not in ("0", "0.0"):
+        if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "sleep"):
+            continue
+        if ast.unparse(node.func) == name and ast.unparse(node.args[0]) not in ("0", "0.0"):
             yield node.lineno
 
 
@@ -255,6 +260,11 @@ def _imported(place: PurePosixPath, tree: ast.Module) -> Iterator[str]:
 
 
 @lru_cache(maxsize=1)
+def _tree(text: str) -> ast.Module:
+    return ast.parse(text)
+
+
+@lru_cache(maxsize=1)
 def _nodes(tree: ast.AST) -> list[ast.AST]:
     """All nodes of a file, or of a part of one; most rules ask for those of a whole file, one after the other."""
     return list(ast.walk(tree))
@@ -274,12 +284,37 @@ def tracked() -> list[str]:
     return [name for name in names if (ROOT / name).is_file()]
 
 
+class Class(NamedTuple):
+    """A class of a file. members: names of its methods and fields."""
+
+    name: str
+    members: frozenset[str]
+    is_protocol: bool
+
+
+class Code(NamedTuple):
+    """What the rules ask of a file. imports, classes: of Python alone."""
+
+    violations: list[str]
+    imports: set[str]
+    classes: list[Class]
+
+
+@cache
+def _code(name: str) -> Code:
+    """Read a file once for all rules. Its tree does not stay: those of all files would be half a gigabyte."""
+    data = (ROOT / name).read_bytes()
+    if b"\0" in data:
+        return Code([], set(), [])
+    text = data.decode(errors="replace")
+    if not name.endswith(".py") or name.split("/")[0] not in CODE:
+        return Code(violations(name, text), set(), [])
+    tree = _tree(text)
+    return Code(violations(name, text), {*_imports(PurePosixPath(name), tree)}, _classes(tree))
+
+
 def test_every_file_keeps_the_rules() -> None:
-    found = []
-    for name in tracked():
-        data = (ROOT / name).read_bytes()
-        if b"\0" not in data:
-            found += violations(name, data.decode(errors="replace"))
+    found = [each for name in tracked() for each in _code(name).violations]
 
     assert not found, "\n".join(found)
 
@@ -298,9 +333,9 @@ def test_a_class_name_means_one_thing() -> None:
     places = defaultdict[str, list[str]](list)
     for name in tracked():
         if name.startswith(("schemas/", "services/")) and name.endswith(".py"):
-            for node in _tree(name).body:
-                if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-                    places[node.name].append(name)
+            for each in _code(name).classes:
+                if not each.name.startswith("_"):
+                    places[each.name].append(name)
 
     twice = {name: files for name, files in places.items() if len(files) > 1 and name not in DEFINED_TWICE.split()}
     assert len(places) > 500
@@ -310,11 +345,11 @@ def test_a_class_name_means_one_thing() -> None:
 def test_no_module_imports_itself_through_others() -> None:
     """Nor for types alone: what stands under TYPE_CHECKING counts as well."""
     modules = {}
-    for name in tracked():
-        place = PurePosixPath(name)
+    for path in tracked():
+        place = PurePosixPath(path)
         if place.parts[0] in ("schemas", "services") and place.suffix == ".py":
-            modules[".".join(place.with_suffix("").parts).removesuffix(".__init__")] = place
-    imports = {name: {*_imports(place, _tree(place))} & modules.keys() - {name} for name, place in modules.items()}
+            modules[".".join(place.with_suffix("").parts).removesuffix(".__init__")] = path
+    imports = {name: _code(path).imports & modules.keys() - {name} for name, path in modules.items()}
     # A package is imported with each of its modules; what it says itself counts, that it is there does not.
     imports = {name: {each for each in found if not name.startswith(each + ".")} for name, found in imports.items()}
     while free := {name for name, found in imports.items() if not found & imports.keys()}:
@@ -326,58 +361,50 @@ def test_no_module_imports_itself_through_others() -> None:
 
 SEAMS = {
     "services/recording: Records": "a list fulfils it, too",
-    "services/control/torso: Parts": "known: the torso is still cut in slices",
 }
 """Protocols of which there is one class in their folder, and why they stand all the same."""
 
 
-def slices(trees: dict[str, ast.Module]) -> list[str]:
+def slices(by_file: dict[str, list[Class]]) -> list[str]:
     """Protocols that describe one class of their own folder, by its path: a class that was cut in slices.
 
-    A seam has several classes behind it, or one that stands elsewhere; then a Protocol is right. trees: by path.
+    A seam has several classes behind it, or one that stands elsewhere; then a Protocol is right. by_file: by path.
     """
-    classes = [
-        (
-            PurePosixPath(path).parent,
-            each.name,
-            _members(each),
-            any("Protocol" in ast.unparse(base) for base in each.bases),
-        )
-        for path, tree in trees.items()
-        for each in _classes(tree)
-    ]
+    classes = [(PurePosixPath(path).parent, each) for path, classes in by_file.items() for each in classes]
     found = []
-    for folder, protocol, names, is_protocol in classes:
-        if names and is_protocol:
-            described = [(place, name) for place, name, theirs, is_seam in classes if not is_seam and names <= theirs]
+    for folder, (protocol, members, is_protocol) in classes:
+        if members and is_protocol:
+            described = [
+                (place, each.name) for place, each in classes if not each.is_protocol and members <= each.members
+            ]
             if [place for place, _ in described] == [folder]:
                 found.append(f"{folder}: {protocol} describes {described[0][1]} and nothing else: name the class")
     return found
 
 
-@cache
-def _tree(name: str | PurePosixPath) -> ast.Module:
-    return ast.parse((ROOT / name).read_text(encoding="utf-8"))
-
-
-def _classes(tree: ast.Module) -> Iterator[ast.ClassDef]:
+def _classes(tree: ast.Module) -> list[Class]:
     """The classes of a file; those within functions have no Protocol outside."""
-    yield from (each for each in tree.body if isinstance(each, ast.ClassDef))
+    return [
+        Class(each.name, _members(each), any("Protocol" in ast.unparse(base) for base in each.bases))
+        for each in tree.body
+        if isinstance(each, ast.ClassDef)
+    ]
 
 
-def _members(of: ast.ClassDef) -> set[str]:
+def _members(of: ast.ClassDef) -> frozenset[str]:
     """Names of its methods and fields, those that its methods set too."""
     named = {each.name for each in of.body if isinstance(each, ast.FunctionDef | ast.AsyncFunctionDef)}
     named |= {ast.unparse(each.target) for each in of.body if isinstance(each, ast.AnnAssign)}
     for each in ast.walk(of):
-        if isinstance(each, ast.Attribute) and isinstance(each.ctx, ast.Store) and ast.unparse(each.value) == "self":
-            named.add(each.attr)
-    return named - {"__init__"}
+        match each:
+            case ast.Attribute(value=ast.Name(id="self"), attr=name, ctx=ast.Store()):
+                named.add(name)
+    return frozenset(named - {"__init__"})
 
 
 def test_no_protocol_describes_one_class_of_its_own_folder() -> None:
     code = [name for name in tracked() if name.split("/")[0] in CODE and name.endswith(".py")]
-    found = slices({name: _tree(name) for name in code})
+    found = slices({name: _code(name).classes for name in code})
 
     assert {each.split(" describes ")[0] for each in found} == SEAMS.keys(), "\n".join(found)
 
@@ -394,17 +421,16 @@ def test_no_protocol_describes_one_class_of_its_own_folder() -> None:
 )
 def test_a_slice_of_a_class_is_told_from_a_seam(others: dict[str, str], is_slice: bool) -> None:
     protocol = {"services/x/p.py": "class P(Protocol):\n    def f(self): ..."}
-    trees = {path: ast.parse(text) for path, text in {**protocol, **others}.items()}
+    by_file = {path: _classes(ast.parse(text)) for path, text in {**protocol, **others}.items()}
 
-    assert bool(slices(trees)) == is_slice
+    assert bool(slices(by_file)) == is_slice
 
 
 def test_the_list_of_shells_holds_only_files_that_need_it() -> None:
     for name in SHELLS:
         path = ROOT / name
         assert path.is_file(), f"{name} is gone: take it off the list"
-        modules = set(_imports(PurePosixPath(name), ast.parse(path.read_text())))
-        parts = [each.split(".") for each in modules]
+        parts = [each.split(".") for each in _code(name).imports]
         needs = [each for each in parts if each[0] in IMPURE or each[1:2] in ([m] for m in MACHINERY)]
         assert needs, f"{name} is pure: take it off the list"
 

@@ -14,8 +14,8 @@ from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import connect
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import load
-from engage_hri.services.generation import fragment_runner
-from engage_hri.services.generation.service import WORLD_PATIENCE
+from engage_hri.services.generation import fragments
+from engage_hri.services.generation.intake import WORLD_PATIENCE
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.service import running
@@ -55,7 +55,7 @@ async def test_a_speech_too_long_is_refused_in_a_block_and_in_a_fragment(hub: Me
 async def test_one_fragment_too_many_is_refused_and_the_others_are_performed(
     hub: MemoryHub, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fragment_runner, "FRAGMENTS", 5)
+    monkeypatch.setattr(fragments, "FRAGMENTS", 5)
     async with whole_robot(hub) as robot:
         asked = [
             asyncio.create_task(

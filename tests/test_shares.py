@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from tests.long_share import LONG, SHORT_PROCESSES, SMOKE, is_long
+from tests.long_share import LONG, LONG_TESTS, SHORT_PROCESSES, SMOKE, is_long
 from tests.longest import LONGEST
 from tests.random_cases import share_of, trials
 
@@ -44,22 +44,36 @@ def test_make_asks_for_a_share_or_for_all(goal: str, name: str, short: bool) -> 
 @pytest.mark.parametrize(
     ("name", "real_time", "long"),
     [
-        ("bus/test_cuts.py", True, True),
-        ("bus/test_order.py", False, False),
-        ("lab/test_lab.py", False, True),
-        ("test_wheel.py", False, True),
-        (SMOKE, True, False),
+        ("bus/test_cuts.py::test_it", True, True),
+        ("bus/test_order.py::test_it", False, False),
+        ("lab/test_lab.py::test_it", False, True),
+        ("test_wheel.py::test_it", False, True),
+        ("a.py::test_whole", False, True),
+        ("a.py::test_whole[case]", False, True),
+        ("a.py::test_whole_part", False, False),
+        ("a.py::TestAll::test_it[case]", False, True),
+        ("a.py::test_some[raw]", False, True),
+        ("a.py::test_some[plain]", False, False),
+        (f"{SMOKE}::test_it", True, False),
     ],
 )
-def test_what_is_in_real_time_or_listed_is_long_but_for_the_smoke(name: str, real_time: bool, long: bool) -> None:
-    assert is_long(TESTS / name, real_time=real_time) is long
+def test_what_is_in_real_time_or_listed_is_long_but_for_the_smoke(
+    monkeypatch: pytest.MonkeyPatch, name: str, real_time: bool, long: bool
+) -> None:
+    monkeypatch.setitem(LONG_TESTS, "a.py", dict.fromkeys(("test_whole", "TestAll", "test_some[raw]"), ""))
+    file, _, test = name.partition("::")
+
+    assert is_long(TESTS / file, test, real_time=real_time) is long
 
 
 def test_what_the_long_share_names_is_there_and_has_a_reason() -> None:
     named = {**LONG, **SHORT_PROCESSES}
+    tests = [(file, test) for file, named in LONG_TESTS.items() for test in named]
 
-    assert [name for name in named if not (TESTS / name).exists()] == []
+    assert [name for name in (*named, *LONG_TESTS) if not (TESTS / name).exists()] == []
+    assert [each for file, each in tests if f" {each.partition('[')[0]}(" not in (TESTS / file).read_text()] == []
     assert all(named.values())
+    assert all(all(each.values()) for each in LONG_TESTS.values())
 
 
 CONFTEST = """\
@@ -108,7 +122,7 @@ def test_a_process_that_nobody_has_marked_is_red_and_what_is_left_out_is_told(tm
     unmarked, reason = pytest_in(tmp_path, *workers, "-m", "not long")
 
     assert (short, unmarked) == (0, 1)
-    assert "1 tests are left to `make test-long`" in told
+    assert "1 tests are left to `make test-all`" in told
     assert "it starts a process: mark it `real_time`" in reason
 
 

@@ -18,7 +18,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.access import role_of
-from engage_hri.schemas.faults import Cause, EngageError, Fault, InputRefused, NoReply
+from engage_hri.schemas.faults import Cause, EngageError, Fault, InputRefused, NoReply, bug
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Request, Unreadable, kind_of, life_of
 from engage_hri.schemas.status import BusHealth, ProcessFacts
@@ -124,10 +124,7 @@ class Bus(ABC):
 
     def failed(self, error: BaseException, what: object) -> Fault:
         """Log, count and tell an unforeseen exception. what: see `containing`."""
-        reason = error.fault.reason if isinstance(error, EngageError) else _text(error)
-        fault = Fault(
-            reason=reason, where=_told(what), advice="this is a bug: the log has its traceback", service=self.name
-        )
+        fault = bug(error, _told(what), self.name)
         self.failures += 1
         self.log.error("%s: %s", self.name, fault, exc_info=error)
         self._complain(fault)
@@ -275,13 +272,6 @@ class Containing:
             except Exception as worse:
                 self._bus.failed(worse, "what follows from the fault before")
         return True
-
-
-def _text(error: BaseException) -> str:
-    try:
-        return f"{type(error).__name__}: {error}"
-    except Exception:  # the error's own __str__ raises
-        return type(error).__name__
 
 
 def is_asked_to_stop() -> bool:

@@ -50,7 +50,7 @@ FAMILIES: dict[str, dict[str, str]] = {
         "record": "Record all that a robot says on its bus into a file (MCAP), until Ctrl-C.",
         "replay": "Play a recording on a bus, at any speed, to and fro. Exit 75 if a live robot of its name is "
         "there.",
-        "export": "Turn a recording into annotations (ELAN, Praat, CSV), or pictures of the scene.",
+        "export": "Turn a recording into annotations (ELAN, CSV), lines, or the settings of its services.",
         "analyse": "Make the tables of a study of recordings of people, or recognize them once more (--again).",
         "session": "",
     },

@@ -1,61 +1,46 @@
-"""The service `control`: takes requests from the bus, has the body perform them, and publishes what it reports."""
+"""The service `control`: takes requests from the bus, has the body perform them, and publishes what it reports.
+
+It decides nothing: `serving/intake.py` does. What comes from the bus, the desk, the driver and the clock is handed
+there, one step at a time, and what comes out is carried out here.
+"""
 
 import asyncio
 import logging
 from contextlib import aclosing, nullcontext
 from functools import partial
 
-from msgspec.structs import replace
+from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import Gaze, GazeShift, HeadDirectionShift
-from engage_hri.schemas.body import (
-    AbortBehavior,
-    BehaviorAborted,
-    BehaviorOutcome,
-    GoHome,
-    HomeReached,
-    PerformBehavior,
-    SyncPointArrived,
-    SyncPointReached,
-    WordSpoken,
-)
-from engage_hri.schemas.body_faults import SwitchFaults
-from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
-from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.holds import BodyHeld
-from engage_hri.schemas.requests import Cancel, Request
+from engage_hri.schemas.body_faults import BodyFault, SwitchFaults
+from engage_hri.schemas.covered import COVERED_FOR
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.requests import Accepted, Refused, Request
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Received, is_asked_to_stop
 from engage_hri.services.control.bases.drivers import made, with_settings_of_drivers
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.body import (
-    AbortMode,
-    Arrived,
     BehaviorRefused,
     Body,
     BodyFailed,
     DriverBroken,
     MovementAuthority,
-    Progress,
-    Reached,
     Spoke,
-    TakenOver,
 )
 from engage_hri.services.control.contract.calibration import calibrated
 from engage_hri.services.control.contract.refusals import VOICE_ADVICE
-from engage_hri.services.control.contract.variability import Deviations, is_lost
-from engage_hri.services.control.serving.actions import ActionReporter
-from engage_hri.services.control.serving.behavior_task import Performing
-from engage_hri.services.control.serving.dead_man import Unheard
-from engage_hri.services.control.serving.fault_switch import FaultSwitch
-from engage_hri.services.control.serving.live_behavior import LiveBehavior
+from engage_hri.services.control.serving import effects, steps
+from engage_hri.services.control.serving.intake import ControlIntake
+from engage_hri.services.control.serving.progress_check import sound
 from engage_hri.services.control.serving.questions import Questions
 from engage_hri.services.control.serving.state_publisher import Shown
 from engage_hri.services.control.serving.warnings_told import recovered, warn
 from engage_hri.services.requests.ends import RequestDesk
-from engage_hri.services.requests.serving_effects import HoldRequest
+from engage_hri.services.runtime.alarm import Timer
+from engage_hri.services.runtime.intake import AnswerRequest, Input, PublishMessage
+from engage_hri.services.runtime.noted import BusClock, NotedIntake
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 
@@ -89,16 +74,14 @@ async def embody(
             "control: the body %s has no voice: %s", body.capabilities.body, VOICE_ADVICE
         )
     async with body.connected() if connects else nullcontext(), asyncio.TaskGroup() as tasks:
-        control = _Control(bus, config, body, tasks, CoveredObjects(covered_for))
+        control = _Control(bus, config, body, tasks)
         with bus.subscribe(*RequestDesk.patterns("control"), keys.WORLD) as inbox:
             bus.answer(keys.ESTIMATE, control.questions.estimate)
             bus.answer(keys.DESCRIBE, control.questions.describe)
             tell_settings(bus, "control", told, config.files, covered_for=covered_for)
             ready()
             try:
-                control.tell_held()
-                control.switch.tell()
-                control.shown.begin()
+                control.begin(covered_for)
                 async for received in inbox:
                     with bus.containing(received):
                         control.take(received)
@@ -106,301 +89,232 @@ async def embody(
                 control.close()
 
 
-class _Control:
-    """State of the service, and what it does with each message that `embody` receives."""
+class _Stream:
+    """Stream of what a driver tells of one behavior, as long as somebody listens.
 
-    def __init__(
-        self, bus: Bus, config: ControlConfig, body: Body, tasks: asyncio.TaskGroup, objects: CoveredObjects
-    ) -> None:
-        self._live: dict[str, LiveBehavior] = {}
-        self._unheard = Unheard()
+    authority: what the driver may do. is_revoked: the intake knows that it is to end. is_left: nobody listens any
+    more. is_cut_off: the task was cancelled.
+    """
+
+    def __init__(self, authority: MovementAuthority) -> None:
+        self.authority = authority
+        self.task: asyncio.Task[None] | None = None
+        self.is_revoked = self.is_left = self.is_cut_off = False
+
+    def leave(self, *, is_cut_off: bool) -> None:
+        """Listen no more. is_cut_off: the driver does not end by itself."""
+        self.is_left, self.is_cut_off = True, is_cut_off
+        if is_cut_off and self.task is not None:
+            self.task.cancel()
+
+
+class _Control:
+    """Hands what `embody` receives, and what the driver tells, to the intake, and carries out what comes of it."""
+
+    def __init__(self, bus: Bus, config: ControlConfig, body: Body, tasks: asyncio.TaskGroup) -> None:
         self.desk = RequestDesk(
-            bus, "control", self._requester_lost, on_extend=self.serve, on_hold=self._hold, term=DEAD_MAN
-        )
+            bus, "control", partial(self._serve, is_orphaned=True), on_extend=self._serve, on_hold=self._take,
+            term=DEAD_MAN,
+        )  # fmt: skip
         self._bus = bus
-        self._config = config
         self._body = body
         self._tasks = tasks
-        self._actions = ActionReporter(bus.robot, bus.clock)
-        self._world = World(entities=())
-        self._objects = objects
+        self._intake = ControlIntake(bus.robot, config, bus.clock)
+        self._timer = Timer(self._advance)
+        self._steps = NotedIntake(bus, "control", self._intake, BusClock(bus), self._carry_out_safely)
+        self._streams: dict[str, _Stream] = {}
+        """Behaviors under way, by the names of their requests."""
         self._homeward: dict[str, asyncio.Task[None]] = {}
-        """Tasks that take the body home, by the id of the request that asked for it."""
-        self._sent = 0
-        self._has_not_come_home = False
-        """A way home has failed, and none of the whole body has come to its end since."""
-        body.on_fault = self._tell_fault
+        """Tasks that take the body home, by the names of the requests for it."""
+        self._looking_at = ""
+        """What the eyes rest on, as the intake was told."""
+        body.on_fault = lambda fault: self._take(steps.BodyComplained(fault))
         body.on_recovery = partial(recovered, bus)
         calibration = calibrated(body, config.calibration)
-        self.questions = Questions(bus, config, body, calibration, lambda: self._world)
-        self.shown = Shown(bus, body, self._actions, config.state_rate, calibration)
-        self.switch = FaultSwitch(bus, body, self.desk)
+        self.questions = Questions(bus, config, body, calibration, self._intake)
+        self._shown = Shown(bus, body, config.state_rate, self._note_eyes, calibration)
 
-    # -- requests -----------------------------------------------------------------------------------------------
-
-    def take(self, received: Received) -> None:
-        if isinstance(received.message, World):
-            self.see(received.message)
-        elif (request := self.desk.take(received)) is not None:
-            with self.desk.serving(request):
-                self.serve(request)
-
-    def see(self, world: World) -> None:
-        self._world = self._objects.see(world, self._bus.now())
-        self._body.see(self._world)
-        self.note_look()
-        if self._body.state().moving:
-            self.shown.look_soon()
-
-    def serve(self, request: Request) -> None:
-        """Serve a request that is new, or that changes a live one."""
-        live = self._live.get(request.id)
-        match request:
-            case PerformBehavior() if live is not None:
-                self._extend(live, request)
-            case PerformBehavior():
-                self._begin(request)
-            case AbortBehavior():
-                self._abort(request)
-            case SwitchFaults():
-                self.switch.serve(request)
-                self.shown.look_soon()
-            case Cancel() if live is not None:
-                live.stop(request.fault(live.request.behavior.id))
-                self._revoke(live)
-            case GoHome():
-                self.desk.accept(request.id)
-                way = self._tasks.create_task(self._go_home(request), name=f"home {request.id}")
-                self._homeward[request.id] = way
-                way.add_done_callback(lambda _: self._homeward.pop(request.id, None))
-            case Cancel(id=id) if id in self._homeward:
-                self._homeward[id].cancel()
-                self.desk.refuse(id, request.fault(id).following("given up on the way home", id))
-
-    def _begin(self, request: PerformBehavior) -> None:
-        refused = self.questions.refused(request.behavior)  # before a motor sees it
-        if refused is not None and refused.fault is not None:
-            self.desk.refuse(request.id, refused.fault)
-            return
-        try:
-            authority = MovementAuthority(request.behavior, request.through, self._pace(request))
-        except ValueError as error:
-            self.desk.refuse(request.id, Fault(reason=str(error), where=request.behavior.id, service="control"))
-            return
-        id = self.desk.asked(request.id).id
-        live = self._live[request.id] = LiveBehavior(request, id, authority)
-        self._tasks.create_task(self._perform(live), name=f"behavior {request.id}")
-
-    def _abort(self, request: AbortBehavior) -> None:
-        """End every live behavior of that name, whichever requester has asked for it."""
-        label = f"{request.block}:{request.behavior}"
-        meant = [live for live in self._live.values() if live.label == label]
-        if not meant:
-            self.desk.refuse(request.id, Fault(reason="no such behavior", where=label, service="control"))
-            return
-        self.desk.accept(request.id)
-        for live in meant:
-            why = Fault(
-                reason="aborted on request", where=request.behavior, cause="cancelled", whose=request.requester
-            )
-            live.stop(why)
-            self._revoke(live, request.how)
-            live.aborts.append(request.id)
-
-    def _revoke(self, live: LiveBehavior, how: AbortMode = "relax") -> None:
-        """Revoke the authority of a behavior. An error of a driver that watches it is contained."""
-        with self._bus.containing(f"the end of behavior {live.label}"):
-            live.authority.revoke(how)
-
-    def _pace(self, request: PerformBehavior) -> dict[str, Seconds]:
-        return {planned.sync: self._bus.local(planned.at) for planned in request.pace}
-
-    def _extend(self, live: LiveBehavior, request: PerformBehavior) -> None:
-        if request.held:
-            live.hold(True)
-        live.authority.set_pace(self._pace(request))
-        try:
-            live.authority.extend(request.through)
-        except ValueError as error:
-            where = live.request.behavior.id
-            self._bus.publish(keys.fault("control"), Fault(reason=str(error), where=where, service="control"))
-        if not request.held:
-            live.hold(False)
-
-    async def _perform(self, live: LiveBehavior) -> None:
-        """Perform a behavior, from its request to the one terminal answer."""
-        request, accepted = live.request, False
-        performing = Performing(live, self._body, self._give_up)
-        try:
-            async with performing, aclosing(performing.progress()) as stream:
-                async for progress in stream:
-                    if not accepted:
-                        self.desk.accept(request.id)
-                        accepted = True
-                    self._report(live, progress)
-        except BehaviorRefused as error:
-            self._forget(live)
-            self.desk.refuse(request.id, error.fault)
-            self._end_aborts(live)
-            return
-        except (Exception, asyncio.CancelledError) as error:
-            if is_asked_to_stop() and not performing.is_broken_off:
-                raise
-            live.status = "failed"
-            if isinstance(error, BodyFailed):
-                live.fault = error.fault
-            elif live.fault is None:
-                live.fault = self._bus.failed(error, f"behavior {live.label}")
-            if isinstance(error, DriverBroken) or not isinstance(error, BodyFailed):
-                self._take_home(f"after {live.label} broke")  # nobody knows where its parts are
-        if live.status == "aborted":
-            live.status, live.fault = live.aborted, live.why
-            if live.authority.revoked == "taken_over":
-                reason, by = "another behavior took its part", request.requester
-                live.status = "taken_over"
-                live.fault = Fault(reason=reason, where=request.behavior.id, cause="replaced", whose=by)
-        self._finish(live)
-
-    def _give_up(self, live: LiveBehavior) -> None:
-        """End a behavior without its driver, which does not end it."""
-        live.status = "failed"
-        self._finish(live)
-        self._take_home(f"after {live.label} was given up")
-
-    def _finish(self, live: LiveBehavior) -> None:
-        if live.request.id in self._live:
-            self._forget(live)
-            with self.desk.serving(live.request):
-                self._end(live)
-            self._end_aborts(live)
-
-    def _forget(self, live: LiveBehavior) -> None:
-        del self._live[live.request.id]
-        if self._unheard.forget(live):
-            self.tell_held()
-
-    def _end(self, live: LiveBehavior) -> None:
-        request, at = live.request, self._bus.now()
-        self.shown.tell(self._actions.ended(request.id, at))
-        self.note_look()
-        self.shown.look_soon()
-        outcome = BehaviorOutcome(
-            id=request.id, block=request.block, behavior=request.behavior.id, status=live.status,
-            at=self._bus.stamp(at), passed=live.passed, spoken=live.spoken, fault=live.fault,
-        )  # fmt: skip
-        self.desk.end(outcome)
-
-    def _end_aborts(self, live: LiveBehavior) -> None:
-        """Answer the abort requests that waited for this behavior and wait for no other one."""
-        awaited = {id for other in self._live.values() for id in other.aborts}
-        for id in live.aborts:
-            if id not in awaited:
-                self.desk.end(BehaviorAborted(id=id))
-
-    async def _go_home(self, request: GoHome) -> None:
-        with self.desk.serving(request):
-            if (fault := await self._homed(request.parts)) is not None:
-                self.desk.refuse(request.id, replace(fault, whose=request.requester) if fault.cause else fault)
-                return
-            self.note_look()
-            self.desk.end(HomeReached(id=request.id, at=self._bus.stamp()))
-
-    async def _homed(self, parts: tuple[str, ...] = ()) -> Fault | None:
-        """Take parts home. Returns what has gone wrong, which has been told."""
-        try:
-            await self._body.home(parts)
-        except BodyFailed as error:
-            if not isinstance(error, TakenOver):
-                self._tell_fault(error.fault)
-                self._has_not_come_home = True
-            return error.fault
-        if self._has_not_come_home and not parts:
-            self._has_not_come_home = False
-            recovered(self._bus, "the body is at home")
-        return None
-
-    def _take_home(self, name: str) -> None:
-        """Move the whole body home without a request."""
-
-        async def go() -> None:
-            with self._bus.containing(f"way home {name}"):
-                await self._homed()
-
-        self._tasks.create_task(go(), name=f"home {name}")
-        self.shown.look_soon()
-
-    # -- reports ------------------------------------------------------------------------------------------------
-
-    def _report(self, live: LiveBehavior, progress: Progress) -> None:
-        request = live.request
-        id, block, behavior, requester = live.id, request.block, request.behavior.id, request.requester
-        at = self._bus.stamp(progress.at)
-        match progress:
-            case Arrived(sync=sync):
-                self._tell(
-                    SyncPointArrived(id=id, block=block, behavior=behavior, sync=sync, at=at, requester=requester)
-                )
-                self.note_look(live, progress.at)
-            case Reached(sync=sync):
-                came = self._bus.stamp(progress.arrived)
-                reached = SyncPointReached(
-                    id=id, block=block, behavior=behavior, sync=sync, at=at, arrived=came, requester=requester
-                )
-                self._tell(reached)
-                live.passed = sync
-                live.status = "done" if sync == "end" else live.status
-                self.shown.tell(self._actions.reached(request.id, live.label, request.behavior, progress))
-                self.note_look(live, progress.at)
-            case Spoke(word=word, position=position):
-                live.position = int(position)  # a driver's number, of whatever type
-                self._tell(WordSpoken(block=block, behavior=behavior, word=word, position=position, at=at))
-        self.shown.look_soon()
-
-    def _tell(self, message: SyncPointArrived | SyncPointReached | WordSpoken) -> None:
-        self._sent += 1
-        on = Deviations(self._config.variability.seed, self._body.faults)
-        if not is_lost(on, self._sent, message.at.seconds):
-            self._bus.publish(keys.SYNC_POINT, message)
-
-    def note_look(self, live: LiveBehavior | None = None, at: Seconds | None = None) -> None:
-        """Publish what the eyes rest on, if that has changed."""
-        of_head = live is not None and isinstance(live.request.behavior, Gaze | GazeShift | HeadDirectionShift)
-        label = live.label if live is not None and of_head else ""
-        self.shown.note_look(label, at)
-
-    def _tell_fault(self, fault: Fault) -> None:
-        """Publish what went wrong with the body outside of any behavior."""
-        warn(self._bus, fault)
-        self.shown.look_soon()
-
-    # -- dead man -----------------------------------------------------------------------------------------------
-
-    def _hold(self, hold: HoldRequest) -> None:
-        """Hold a behavior that nobody renews, or let it go on."""
-        if (live := self._live.get(hold.name)) is None:
-            return
-        self._unheard.let_go(live)
-        if hold.until is not None:
-            self._unheard.hold(live, self._bus.stamp(), self._bus.stamp(hold.until), hold.why)
-        self.tell_held()
-
-    def tell_held(self) -> None:
-        """Publish what waits since nobody renews it."""
-        self._bus.publish(keys.BODY_HELD, BodyHeld(at=self._bus.stamp(), holds=self._unheard.holds))
-
-    def _requester_lost(self, cancel: Cancel) -> None:
-        """Revoke a behavior that has lost its requester. With the last one of that requester the body goes home."""
-        live = self._live.get(cancel.id)
-        if live is None:
-            return
-        live.stop(cancel.fault(live.label), "lapsed")
-        self._revoke(live)
-        others = (each for each in self._live.values() if each.request.requester == cancel.requester)
-        if all(each.authority.revoked for each in others):
-            why = cancel.fault("")
-            warn(self._bus, replace(why, reason=f"{why.reason}; the body goes home", service="control"))
-            self._take_home(f"after {cancel.requester}")
+    def begin(self, covered_for: Seconds) -> None:
+        """Tell that nothing goes on yet, and look at the body for the first time."""
+        begun = steps.ControlBegan(able=self._body.capabilities, covered_for=covered_for, faults=self._body.faults)
+        self._take(begun)
+        self._shown.look()
 
     def close(self) -> None:
         self.desk.close()
-        self.shown.close()
+        self._shown.close()
+        self._timer.set(None)
+
+    # -- steps --------------------------------------------------------------------------------------------------
+
+    def take(self, received: Received) -> None:
+        """Take a message."""
+        if isinstance(received.message, World):
+            world = Input(received.key, received.message, received.source, received.at, received.past, received.life)
+            self._steps.take(world, received.number)
+            self._timer.set(self._steps.deadline)
+        elif (request := self.desk.take(received)) is not None:
+            self._serve(request)
+
+    def _serve(self, request: Request, *, is_orphaned: bool = False) -> None:
+        """Hand over a request of the desk. is_orphaned: it is the end of one that has lost its requester."""
+        with self.desk.serving(request):
+            id = self.desk.asked(request.id).id
+            handed = steps.RequestHanded(request=request, asked=id, is_orphaned=is_orphaned)  # type: ignore[arg-type]
+            self._steps.take_own(handed)
+        self._timer.set(self._steps.deadline)
+
+    def _take(self, step: steps.ControlStep) -> None:
+        """Take a step that comes by no bus."""
+        with self._bus.containing(step):
+            self._steps.take_own(step)
+        self._timer.set(self._steps.deadline)
+        if not isinstance(step, steps.ControlBegan | steps.EyesMoved):
+            self._shown.look_soon()
+
+    def _advance(self) -> None:
+        with self._bus.containing("what is due by now"):
+            self._steps.advance()
+        self._timer.set(self._steps.deadline)
+
+    def _carry_out_safely(self, output: Struct) -> None:
+        """Carry out an effect. An error of a driver that it meets keeps none of the others from it."""
+        with self._bus.containing(output, partial(self._undone, output)):
+            self._carry_out(output)
+
+    def _undone(self, output: Struct, fault: Fault) -> None:
+        if isinstance(output, effects.BeginBehavior):
+            self._take(steps.StreamEnded(request=output.request.id, how="broken", fault=fault))
+
+    def _carry_out(self, output: Struct) -> None:
+        match output:
+            case PublishMessage(key=key, message=message):
+                self._bus.publish(key, message)
+            case AnswerRequest(answer=Accepted(id=id)):
+                self.desk.accept(id)
+            case AnswerRequest(answer=Refused(id=id, fault=fault)):
+                self.desk.refuse(id, fault)
+            case AnswerRequest(answer=outcome):
+                self.desk.end(outcome)
+            case effects.Alert(fault=fault):
+                warn(self._bus, fault)
+            case effects.Reassure(text=text):
+                recovered(self._bus, text)
+            case effects.ShowWorld(world=world):
+                self._body.see(world)
+                self._look()
+                if self._body.state().moving:
+                    self._shown.look_soon()
+            case effects.PlayFaults(request=request, faults=faults):
+                self._play(request, faults)
+            case effects.BeginBehavior():
+                self._begin(output)
+            case effects.GiveAuthority(request=id, through=through, pace=pace):
+                authority = self._streams[id].authority
+                authority.set_pace({planned.sync: self._bus.local(planned.at) for planned in pace})
+                authority.extend(through)
+            case effects.HoldBehavior(request=id, is_held=is_held):
+                authority = self._streams[id].authority
+                authority.hold() if is_held else authority.go_on()
+            case effects.RevokeAuthority(request=id, how=how):
+                self._streams[id].is_revoked = True
+                self._streams[id].authority.revoke(how)
+            case effects.LeaveStream(request=id, is_cut_off=is_cut_off):
+                self._streams[id].leave(is_cut_off=is_cut_off)
+            case effects.TakeHome(request=id, parts=parts, why=why):
+                way = self._tasks.create_task(self._go_home(id, parts, why), name=f"home {why}")
+                if id:
+                    self._homeward[id] = way
+                    way.add_done_callback(lambda _: self._homeward.pop(id, None))
+                self._shown.look_soon()
+            case effects.StopHome(request=id):
+                self._homeward[id].cancel()
+
+    # -- what the body does -------------------------------------------------------------------------------------
+
+    def _begin(self, begun: effects.BeginBehavior) -> None:
+        request = begun.request
+        pace = {planned.sync: self._bus.local(planned.at) for planned in request.pace}
+        stream = _Stream(MovementAuthority(request.behavior, request.through, pace))
+        self._streams[request.id] = stream
+        stream.authority.watch(lambda: self._note_revoked(request.id, stream))
+        stream.task = self._tasks.create_task(self._perform(begun, stream), name=f"behavior {request.id}")
+
+    def _note_revoked(self, id: str, stream: _Stream) -> None:
+        """Take note that the body itself has revoked an authority."""
+        if (how := stream.authority.revoked) is not None and not stream.is_revoked:
+            stream.is_revoked = True
+            self._take(steps.AuthorityRevoked(request=id, how=how))
+
+    async def _perform(self, begun: effects.BeginBehavior, stream: _Stream) -> None:
+        """Let the driver perform a behavior, and pass on what it tells."""
+        id, label = begun.request.id, f"{begun.request.block}:{begun.request.behavior.id}"
+        ended = steps.StreamEnded(request=id)
+        try:
+            async with aclosing(self._body.perform(begun.behavior, stream.authority)) as progress:
+                async for told in progress:
+                    if not stream.is_left:
+                        self._note_progress(id, stream, told)
+                    if stream.is_left:
+                        break
+        except BehaviorRefused as error:
+            ended = steps.StreamEnded(request=id, how="refused", fault=error.fault)
+        except DriverBroken as error:
+            ended = steps.StreamEnded(request=id, how="broken", fault=error.fault)
+        except BodyFailed as error:
+            ended = steps.StreamEnded(request=id, how="failed", fault=error.fault)
+        except (Exception, asyncio.CancelledError) as error:
+            if is_asked_to_stop() and not stream.is_cut_off:
+                raise
+            fault = None if stream.is_cut_off else self._bus.failed(error, f"behavior {label}")
+            ended = steps.StreamEnded(request=id, how="broken", fault=fault)
+        del self._streams[id]
+        self._look()
+        self._take(ended)
+
+    def _note_progress(self, id: str, stream: _Stream, told: object) -> None:
+        progress = sound(told)
+        self._steps.take_own(steps.BodyTold(request=id, progress=progress))  # an error in it ends this behavior
+        self._timer.set(self._steps.deadline)
+        self._shown.look_soon()
+        if not stream.is_left and not isinstance(progress, steps.Nonsense | Spoke):
+            self._look(id, progress.at)
+
+    async def _go_home(self, id: str, parts: tuple[str, ...], why: str) -> None:
+        """Take parts home, and say how that has ended. id: name of the request for it; empty: there is none."""
+        ended = steps.HomeEnded(request=id, parts=parts)
+        try:
+            await self._body.home(parts)
+        except BodyFailed as error:
+            ended = steps.HomeEnded(request=id, parts=parts, fault=error.fault)
+        except (Exception, asyncio.CancelledError) as error:
+            if is_asked_to_stop():
+                raise
+            fault = self._bus.failed(error, f"way home {why}")
+            ended = steps.HomeEnded(request=id, parts=parts, fault=fault, is_told=True)
+        self._look()
+        self._take(ended)
+
+    def _play(self, request: SwitchFaults, faults: tuple[BodyFault, ...]) -> None:
+        fault = None
+        try:
+            self._body.switch_faults(faults)
+        except InputRefused as error:
+            fault = error.fault
+        except Exception as error:
+            fault = self._bus.failed(error, request)
+        played = steps.FaultsPlayed(request=request.id, by=request.requester, faults=self._body.faults, fault=fault)
+        self._take(played)
+
+    # -- what the eyes rest on ----------------------------------------------------------------------------------
+
+    def _look(self, id: str = "", at: Seconds | None = None) -> None:
+        """Look at what the eyes rest on. id: name of the request whose behavior has told of its progress, `at`."""
+        with self._bus.containing("what the body looks at"):
+            self._note_eyes(self._body.state().looking_at, id, at)
+
+    def _note_eyes(self, on: str, id: str = "", at: Seconds | None = None) -> None:
+        """Tell the intake what the eyes rest on, if that has changed."""
+        if on != self._looking_at:
+            self._looking_at = on
+            self._take(steps.EyesMoved(on=on, at=self._bus.now() if at is None else at, request=id))

@@ -10,14 +10,6 @@ from engage_hri.schemas.status import ClockOffset, ProcessFacts, Status
 from engage_hri.schemas.units import Seconds
 
 
-class Package(Struct, frozen=True, kw_only=True):
-    """A package that Engage needs. wanted: `>=1.26`. version: empty: it is not there."""
-
-    name: str
-    wanted: str = ""
-    version: str = ""
-
-
 class EndpointFacts(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """An endpoint at which the bus should be found, and whether somebody opens there.
 
@@ -91,7 +83,6 @@ class SystemFacts(Struct, frozen=True, kw_only=True, omit_defaults=True):
     own: ProcessFacts
     services: tuple[str, ...]
     """Services that make up a robot."""
-    packages: tuple[Package, ...] = ()
     doors: tuple[EndpointFacts, ...] = ()
     bus: bool = True
     problem: Fault | None = None

@@ -6,9 +6,8 @@ from typing import Literal
 from msgspec import Struct
 
 from engage_hri.schemas.units import A_DAY, Seconds, span
-from engage_hri.services.doctor.facts import Package, ParticipantFacts, SystemFacts
+from engage_hri.services.doctor.facts import ParticipantFacts, SystemFacts
 from engage_hri.services.doctor.matrix import clock_of, matrix
-from engage_hri.services.runtime.installation import packages_command
 
 Severity = Literal["wrong", "doubtful", "note"]
 SOON = 30
@@ -41,37 +40,6 @@ def findings(facts: SystemFacts) -> tuple[Diagnosis, ...]:
     order: tuple[Severity, ...] = ("wrong", "doubtful", "note")
     found = [finding for rule in RULES for finding in rule(facts)]
     return tuple(sorted(found, key=lambda finding: order.index(finding.severity)))
-
-
-def satisfies(package: Package) -> bool:
-    """Tell whether the version of a package is one that is wanted; a version that is no number counts as one."""
-    if not package.version:
-        return False
-    have = _numbers(package.version)
-    for part in filter(None, package.wanted.replace(" ", "").split(",")):
-        sign = part[:2] if part[:2] in ("==", ">=", "<=", "!=", "~=") else part[:1]
-        wanted = _numbers(part.removeprefix(sign))
-        length = max(len(have), len(wanted))
-        one, other = (each + (0,) * (length - len(each)) for each in (have, wanted))
-        fits = {"==": one == other, "!=": one != other, "<=": one <= other, "<": one < other, ">": one > other}
-        if not fits.get(sign, one >= other):
-            return False
-    return True
-
-
-def _numbers(version: str) -> tuple[int, ...]:
-    digits = ("".join(letter for letter in part if letter.isdigit()) for part in version.split("."))
-    return tuple(int(each) for each in digits if each)
-
-
-def _packages(facts: SystemFacts) -> Iterator[Diagnosis]:
-    for package in facts.packages:
-        if not satisfies(package):
-            what = f"version {package.version} is here" if package.version else "it is not installed"
-            yield Diagnosis(
-                severity="wrong", where=package.name, what=f"{what}; Engage needs {package.name}{package.wanted}",
-                do=packages_command(f"{package.name}{package.wanted}"),
-            )  # fmt: skip
 
 
 def _problem(facts: SystemFacts) -> Iterator[Diagnosis]:
@@ -348,6 +316,6 @@ def _listed(names: Iterable[str]) -> str:
 
 Rule = Callable[[SystemFacts], Iterator[Diagnosis]]
 RULES: tuple[Rule, ...] = (
-    _packages, _problem, _doors, _services, _sight_of_one_another, _answers, _versions, _certificates, _losses,
+    _problem, _doors, _services, _sight_of_one_another, _answers, _versions, _certificates, _losses,
     _paths, _clocks, _abilities,
 )  # fmt: skip

@@ -141,8 +141,6 @@ def _things(facts: SystemFacts) -> Iterator[tuple[str, str]]:
     for until, name in sorted((until, name) for name, until in ends.items())[:1]:
         more = f"; {len(ends)} in all" if len(ends) > 1 else ""
         yield "certificates", f"next to expire: {name}, {_left(until, facts)}{more}"
-    if facts.packages:
-        yield "packages", ", ".join(f"{each.name} {each.version or 'MISSING'}" for each in facts.packages)
     if facts.body is not None:
         voice = "with a voice" if "speech" in facts.body.types else "without a voice"
         yield "body", facts.body.problem or f"{facts.body.name}, {voice}; {len(facts.body.types)} types of behaviors"

@@ -75,6 +75,8 @@ class FragmentPerformance:
         """The plan of the block that is on its way or performed; None before, and between two blocks."""
         self.left, self.turn_left = fragment, turn
         """What has not been performed of fragment and turn: all, unless a reference is chosen again."""
+        self.has_begun = False
+        """True once it is not in line any more."""
         self.is_sent = False
         """True once the realizer has accepted the block of `plan`."""
         self.world: World | None = None
@@ -111,14 +113,9 @@ class FragmentPerformance:
         self._ended: Ended | None = None
 
     def begin(self, plan: FragmentPlan) -> None:
-        """Take the plan whose block is sent next.
-
-        Called again, and with another request id, when a block to which the first one refers had ended meanwhile.
-        """
+        """Take the plan whose block is sent next."""
         self._tries += 1
         self.block_id = f"{self.request.id}.block" + (f"-{self._tries}" if self._tries > 1 else "")
-        if self.plan is not None:  # that block was refused
-            self.acts.pop()
         self.plan = plan
         self.acts.append(Act(plan))
         self.warn(plan.warnings)

@@ -1,19 +1,16 @@
-"""Files of annotations: ELAN (`.eaf`), Praat (`.TextGrid`), and CSV. Pure: tiers in, text out."""
+"""Files of annotations: ELAN (`.eaf`), and CSV. Pure: tiers in, text out."""
 
 import csv
 import io
 from collections.abc import Sequence
 from typing import NamedTuple
-from unicodedata import category
 
 from lxml import etree
 
-from engage_hri.schemas.units import Seconds
 from engage_hri.services.recording.lanes import Tier, rows
 
 _XSI = "http://www.w3.org/2001/XMLSchema-instance"
 _FORMAT = "http://www.mpi.nl/tools/elan/EAFv3.0.xsd"
-MICROSECONDS = 1_000_000
 COLUMNS = ("tier", "actor", "begin", "end", "value")
 
 
@@ -77,61 +74,6 @@ def _xml(text: str) -> str:
     return "".join(
         letter for letter in text if letter in "\t\n\r" or (letter >= " " and letter not in "\ufffe\uffff")
     )
-
-
-def textgrid(tiers: Sequence[Tier], duration: Seconds) -> str:
-    """A TextGrid in Praat's long form. Each tier fills the whole time; what nothing is said of is empty."""
-    filled = [_intervals(tier) for tier in tiers]
-    end = max([_micro(duration), 1, *(intervals[-1][1] for intervals in filled if intervals)])
-    lines = [
-        'File type = "ooTextFile"', 'Object class = "TextGrid"', "", "xmin = 0", f"xmax = {_shown(end)}",
-        "tiers? <exists>", f"size = {len(tiers)}", "item []:",
-    ]  # fmt: skip
-    names = _unique([_line(tier.name) for tier in tiers])
-    for number, (intervals, name) in enumerate(zip(filled, names, strict=True), 1):
-        at = intervals[-1][1] if intervals else 0
-        if end > at:
-            intervals.append((at, end, ""))
-        lines += [
-            f"    item [{number}]:", '        class = "IntervalTier"', f"        name = {_quoted(name)}",
-            "        xmin = 0", f"        xmax = {_shown(end)}", f"        intervals: size = {len(intervals)}",
-        ]  # fmt: skip
-        for place, (begin, until, value) in enumerate(intervals, 1):
-            lines += [
-                f"        intervals [{place}]:", f"            xmin = {_shown(begin)}",
-                f"            xmax = {_shown(until)}", f"            text = {_quoted(value)}",
-            ]  # fmt: skip
-    return "\n".join(lines) + "\n"
-
-
-def _intervals(tier: Tier) -> list[tuple[int, int, str]]:
-    """Intervals in microseconds without gaps, from 0 to the end of the last annotation."""
-    intervals: list[tuple[int, int, str]] = []
-    at = 0
-    for one in tier.annotations:
-        begin = max(at, _micro(one.begin))
-        if begin > at:
-            intervals.append((at, begin, ""))
-        at = max(_micro(one.end), begin + 1)
-        intervals.append((begin, at, one.value))
-    return intervals
-
-
-def _micro(at: Seconds) -> int:
-    return round(at * MICROSECONDS)
-
-
-def _shown(at: int) -> str:
-    return f"{at // MICROSECONDS}.{at % MICROSECONDS:06}"
-
-
-def _quoted(text: str) -> str:
-    return '"' + _line(text).replace('"', '""') + '"'
-
-
-def _line(text: str) -> str:
-    """Text on one line, without control characters. What joins letters stays: other scripts are written with it."""
-    return "".join(" " if category(letter) in ("Cc", "Zl", "Zp") else letter for letter in text)
 
 
 def table(tiers: Sequence[Tier]) -> str:

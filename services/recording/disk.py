@@ -6,33 +6,35 @@ A disk that is full keeps chunks waiting, up to a limit; then the newest are dro
 import mmap
 import os
 import tempfile
-import time
 import zlib
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, closing
 from pathlib import Path
 
-from mcap.records import Metadata, MetadataIndex
-
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.units import Seconds
-from engage_hri.services.recording import descriptor
-from engage_hri.services.recording.reading import Recording
-from engage_hri.services.recording.writing import REPAIRED, Sealed, Writer, end, written
+from engage_hri.services.recording.reading import REPAIRED, Recording
+from engage_hri.services.recording.writing import Sealed, Writer
 
-MOST_PLACES = 10
-"""Damaged places that the note of a repair tells one by one."""
+try:
+    import fcntl
+except ModuleNotFoundError:  # Windows, where nobody else can write an open file
+    fcntl = None  # type: ignore[assignment]
+
+FULL_CHUNK = 1024 * 1024
+"""Bytes, before compression, from which on a chunk goes to the disk at once."""
 WAITING = 32 * 1024 * 1024
 """Bytes of chunks that may wait for room on the disk."""
+MOST_LACKS = 10
+"""Damaged places that the note in a repaired copy tells one by one."""
+PIECE = 2**20
+"""Bytes that are copied at once."""
 Tell = Callable[[str], None]
 
 
 class RecordingFile:
-    """A file that a recorder writes. dropped: messages that found no room. slowest: the longest wait for the disk.
+    """A file that a recorder writes. dropped: messages that found no room. written: bytes in the file.
 
-    written: bytes in the file. path: its name, also when it was renamed. is_removed: it has none any more, and could
-    not be written anew. tell: takes a line about trouble with the disk.
+    is_removed: it has no name any more, and goes with its recorder. tell: takes a line about trouble with the disk.
     """
 
     def __init__(self, path: Path, facts: Mapping[str, str], tell: Tell, *, overwrite: bool = False) -> None:
@@ -40,16 +42,13 @@ class RecordingFile:
         self.path = path
         self.dropped = 0
         self.written = 0
-        self.slowest: Seconds = 0.0
-        self._checksum = 0
         self.tell = tell
+        self.is_removed = False
+        self._checksum = 0
         self._waiting: deque[Sealed] = deque()
         self._trouble = ""
-        self.is_removed = False
-        self._is_elsewhere = False
-        self._asides = ExitStack()
         try:
-            self._file = descriptor.opened(path, overwrite=overwrite)
+            self._file = _opened(path, overwrite=overwrite)
         except BlockingIOError as error:
             fault = Fault(reason="another recorder writes this file", where=str(path), advice="give another one")
             raise InputRefused(fault) from error
@@ -59,13 +58,11 @@ class RecordingFile:
         except OSError as error:
             raise InputRefused(Fault(reason=f"cannot write: {error.strerror}", where=str(path))) from error
         try:
-            self._channels = self._asides.enter_context(closing(Aside(path.parent)))
-            self._chunks = self._asides.enter_context(closing(Aside(path.parent)))
-            self.writer = Writer(self._channels, self._chunks)
+            self._index = Aside(path.parent)
+            self.writer = Writer(self._index)
             self._append(self.writer.begin(facts))
             _sync_folder(path)
         except OSError as error:
-            self._asides.close()
             os.close(self._file)
             path.unlink(missing_ok=True)  # else it would be in the way of the next attempt
             raise InputRefused(Fault(reason=f"cannot write: {error.strerror}", where=str(path))) from error
@@ -75,57 +72,36 @@ class RecordingFile:
         if (sealed := self.writer.seal()) is not None:
             if self._waiting and sum(len(each.data) for each in self._waiting) + len(sealed.data) > WAITING:
                 self.dropped += sealed.messages
-                self.writer.dropped(sealed)
+                self.writer.dropped()
             else:
                 self._waiting.append(sealed)
-        began = time.monotonic()
         try:
             while self._waiting:
                 offset = self.written
                 self._append(self._waiting[0].data)
                 self.writer.placed(self._waiting.popleft(), offset)
-            self._channels.flush()
-            self._chunks.flush()
+            self._index.flush()
             os.fdatasync(self._file)
-            if not self._stay():
-                return False
+            self.is_removed = os.fstat(self._file).st_nlink == 0
         except OSError as error:
             self._complain(f"{error.strerror}; what comes waits in memory, at most {WAITING >> 20} MiB of it")
             return False
-        finally:
-            self.slowest = max(self.slowest, time.monotonic() - began)
+        if self.is_removed:
+            self._complain("removed while it is recorded, and lost with the end of its recorder")
+            return False
         if self._trouble:
             self.tell(f"{self.path}: it is written again; messages lost: {self.dropped}")
             self._trouble = ""
         return True
 
-    def _stay(self) -> bool:
-        """Write a file that somebody has removed anew, and tell of one that was renamed. Returns False: it cannot."""
-        self.is_removed = descriptor.is_removed(self._file)
-        if self.is_removed:
-            try:
-                copy = descriptor.copied(self._file, self.written, self.path)
-            except OSError as error:
-                self._complain(f"removed while it is recorded, and not written anew: {error.strerror}")
-                return False
-            os.close(self._file)
-            self._file, self.is_removed = copy, False
-            _sync_folder(self.path)
-            self.tell(f"{self.path}: removed while it is recorded; written anew, with all that was in it")
-        elif not self._is_elsewhere and not descriptor.is_at(self._file, self.path):
-            self._is_elsewhere = True
-            now = descriptor.name(self._file)
-            self.tell(f"{self.path}: renamed while it is recorded, which goes on{f' in {now}' if now else ''}")
-            self.path = Path(now) if now else self.path
-        return True
-
-    def close(self, note: Mapping[str, str]) -> bool:
-        """End the file in order, with a note about the recording. Returns False if it could not be written whole."""
+    def close(self, notes: Mapping[str, Mapping[str, str]]) -> bool:
+        """End the file in order, with notes by name. Returns False if it could not be written whole."""
         try:
             if not self.write():
                 self.dropped += sum(each.messages for each in self._waiting)
                 return False
-            self._append(self.writer.told("end", note, self.written))
+            for name, note in notes.items():
+                self._append(self.writer.told(name, note, self.written))
             begun = self.written
             try:
                 for piece in self.writer.finish(begun, self._checksum):
@@ -139,7 +115,7 @@ class RecordingFile:
             return False
         finally:
             os.close(self._file)
-            self._asides.close()
+            self._index.close()
         return True
 
     def _append(self, data: bytes) -> None:
@@ -180,7 +156,7 @@ class Aside:
     def __iter__(self) -> Iterator[bytes]:
         """All of them, in pieces; then there is no more to append."""
         os.lseek(self._file, 0, os.SEEK_SET)
-        while piece := os.read(self._file, descriptor.PIECE):
+        while piece := os.read(self._file, PIECE):
             yield piece
         yield bytes(self._waiting)
 
@@ -199,66 +175,38 @@ def read(path: Path) -> Recording:
     return Recording(data, str(path))  # type: ignore[arg-type]  # a map is read like bytes
 
 
-def repair(path: Path) -> int:
-    """Cut off what is no whole record, and write the end that is missing. Returns the bytes of data that it cut.
+def repair(recording: Recording, copy: Path, tell: Tell) -> bool:
+    """Copy all that can be read of a recording into a new file, with a note of what the old one lacks.
 
-    Raises InputRefused: it is no recording, somebody writes it, it cannot be written, or another one is behind it.
+    Returns False if the copy is not whole. Raises InputRefused: it cannot be written, or there is such a file.
     """
-    recording = read(path)
-    if recording.is_whole:
-        return 0
-    if (there := recording.another) is not None:
-        reason = f"another recording begins at byte {there}, and would be cut off"
-        advice = f"part them: `head -c {there} FILE > FIRST`, `tail -c +{there + 1} FILE > SECOND`"
-        raise InputRefused(Fault(reason=reason, where=str(path), advice=advice))
-    contents, until, tail = recording.contents, recording.end, b""
-    if contents.chunks:
-        last, indexes = contents.chunks[-1], recording.indexes(len(contents.chunks) - 1)
-        if len(last.message_index_offsets) < len(indexes):  # so nothing is behind them
-            until = last.chunk_start_offset + last.chunk_length
-            last.message_index_offsets = {}
-            for index in indexes:
-                last.message_index_offsets[index.channel_id] = until + len(tail)
-                tail += written(index)
-            last.message_index_length = len(tail)
-    if found := "; ".join(_found(recording)):
-        note = written(Metadata(name=REPAIRED, metadata={"found": found}))
-        contents.metadata.append(MetadataIndex(offset=until + len(tail), length=len(note), name=REPAIRED))
-        tail += note
-    checksum = zlib.crc32(tail, recording.checksum(until))
-    channels, chunks = map(written, contents.channels), map(written, contents.chunks)
+    lacks, notes = recording.lacks, dict(recording.notes)
+    if lacks:
+        more = [f"and {len(lacks) - MOST_LACKS} more such places"] if len(lacks) > MOST_LACKS else []
+        notes[REPAIRED] = {"found": "; ".join([*lacks[:MOST_LACKS], *more])}
+    file = RecordingFile(copy, recording.facts, tell)
+    for number in range(len(recording)):
+        file.writer.add(*recording.stored(number))
+        if file.writer.size > FULL_CHUNK:
+            file.write()
+    return file.close(notes)
+
+
+def _opened(path: Path, *, overwrite: bool) -> int:
+    """Open an empty file that nobody else opens so at the same time. Raises BlockingIOError: somebody writes it now.
+
+    overwrite: also one that is there.
+    """
+    flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0)
+    file = os.open(path, flags | (0 if overwrite else os.O_EXCL), 0o644)
     try:
-        with path.open("r+b") as file:
-            descriptor.lock(file.fileno())
-            if os.fstat(file.fileno()).st_size != recording.end + recording.lost_bytes:
-                raise BlockingIOError  # it was written between the look and the lock
-            file.truncate(until)
-            file.seek(until)
-            file.write(tail)
-            file.writelines(end(contents, channels, chunks, until + len(tail), checksum))
-            file.flush()
-            os.fsync(file.fileno())
-    except BlockingIOError as error:
-        raise InputRefused(
-            Fault(reason="a recorder writes it now", where=str(path), advice="end it first")
-        ) from error
-    except OSError as error:
-        raise InputRefused(Fault(reason=f"cannot write: {error.strerror}", where=str(path))) from error
-    return 0 if recording.has_all_data else recording.lost_bytes
-
-
-def _found(recording: Recording) -> Iterator[str]:
-    """Note of a repair, in parts: it takes away the signs itself, a missing end and a wrong checksum."""
-    if recording.has_all_data and not recording.damaged:
-        return
-    if recording.repaired:
-        yield recording.repaired
-    if not recording.has_all_data:
-        yield f"what came after {recording.duration:.2f} s is missing"
-    for place in recording.damaged[:MOST_PLACES]:
-        yield f"damaged at byte {place.offset}: {place.reason}"
-    if (more := len(recording.damaged) - MOST_PLACES) > 0:
-        yield f"and {more} more such places"
+        if fcntl is not None:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        os.ftruncate(file, 0)
+    except OSError:
+        os.close(file)
+        raise
+    return file
 
 
 def _sync_folder(path: Path) -> None:

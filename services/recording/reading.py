@@ -1,41 +1,31 @@
 """Reader of recordings, whole ones and those whose writer was killed. Pure: bytes in, messages out.
 
-What is given stood in a chunk, and the chunk agrees with its checksum. The index behind the data only tells of
-channels that no such chunk tells of, and only where it agrees with its own checksum. Whatever is not as a recorder
-writes it is left out, and told in `damaged`. Where a file is cut off the recording ends, and `lost_bytes` says how
-much was not read. Needs the extra `record`.
+What is given stood in a chunk, and the chunk agrees with its checksum. A chunk that does not, or that is not the next
+one of this recording, is left out, and told in `damaged`. Where the end of the data is not found the recording ends,
+and `lost_bytes` says how much was not read. The index at the end of a file is for other programs: it is compared with
+its checksum, and nothing is taken from it. Needs the extra `record`.
 """
 
 import re
 import struct
 import zlib
 from array import array
-from collections import Counter, OrderedDict
 from collections.abc import Iterator
+from functools import lru_cache
 from io import BytesIO
 from math import isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import (
-    Channel,
-    Chunk,
-    ChunkIndex,
-    DataEnd,
-    Header,
-    Message,
-    MessageIndex,
-    Metadata,
-    MetadataIndex,
-    Schema,
-)
+from mcap.records import Channel, Chunk, DataEnd, Metadata
 from mcap.stream_reader import get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused
@@ -46,31 +36,29 @@ from engage_hri.services.bus.payloads import read_payload
 from engage_hri.services.bus.samples import Received, Sample
 from engage_hri.services.recording.form import StoredForm, payload
 from engage_hri.services.recording.losses import CHUNK, LOST, MORE, OWN, ChunkMark, MissingMessages
-from engage_hri.services.recording.writing import PROFILE, REPAIRED, Contents
+from engage_hri.services.recording.writing import PROFILE, Line
 
 _HEAD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 _FOOTER = struct.Struct("<BQQQI")
 _BAD = (
-    McapError, struct.error, ValueError, OverflowError, UnicodeDecodeError, RuntimeError, EOFError, MemoryError,
-    zstandard.ZstdError, msgspec.MsgspecError, RecursionError,
+    McapError, struct.error, ValueError, OverflowError, RuntimeError, EOFError, MemoryError, zstandard.ZstdError,
+    msgspec.MsgspecError, RecursionError,
 )  # fmt: skip
 """Errors of the libraries over bytes that nobody wrote; lz4 has a `RuntimeError`."""
-_CHUNK = re.compile(rb"\x06.{4}\0{4}.{16}.{4}\0{4}.{4}(?:\x04\0{3}zstd|\x03\0{3}lz4|\0{4})", re.DOTALL)
-"""Beginning of a chunk of less than 4 GiB."""
-_BEGINNING = re.compile(rb".{8}\x01.{8}....engage", re.DOTALL)
-"""Beginning of a recording of ours: a mark of eight bytes, and the record that names what wrote it."""
-_DATA_END = _HEAD.size + 4
-"""Bytes of the record at the end of the data."""
+_CHUNK = re.compile(rb"\x06.{36}\x04\0{3}zstd", re.DOTALL)
+"""Beginning of a chunk as a recorder writes it."""
+_CHUNK_HEAD = _HEAD.size + 8 + 8 + 8 + 4 + 4 + 8
+"""Bytes of a chunk beside the name of its compression and its content."""
+_PASSED_OVER = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT)
+"""Records that hold nothing for us."""
 LARGEST_CHUNK = 64 * 1024 * 1024
 """Bytes of a chunk's content. Ours have one MiB, and one message more."""
 CHUNKS_KEPT = 16
 """Number of chunks that are kept decompressed."""
 BILLION = 1_000_000_000
-LONGEST_SILENCE = 3600 * BILLION
-"""Nanoseconds that a recorder may have waited for a robot, by a time that has no checksum."""
-LATEST = 2**63 - 1
-"""Latest time in a file, in nanoseconds since 1970: in the year 2262."""
+REPAIRED = "engage-repaired"
+"""Name of the note in a copy that was made of a damaged recording: what that lacked, in words."""
 
 
 class Damaged(Struct, frozen=True):
@@ -80,13 +68,22 @@ class Damaged(Struct, frozen=True):
     reason: str
 
 
+class Stored(NamedTuple):
+    """A message as it stands in a file. Times in nanoseconds since 1970. sequence: its number, 0: it has none."""
+
+    line: Line
+    data: bytes
+    log_time: int
+    publish_time: int
+    sequence: int
+
+
 class Recording:
     """A recording. Its messages are numbered from 0, in the order in which they came to the recorder.
 
     facts: what the recorder wrote of itself at the beginning (docs/recordings.md). notes: what it wrote later, by
-    name. is_whole: its end is there, and agrees with its checksum. has_all_data: the data ends where it says so, and
-    only the index behind it may be damaged. lost_bytes: bytes at the end that were not read. damaged: everything
-    else that is not as a recorder wrote it.
+    name. has_all_data: the data ends where it says so. is_whole: and the index behind it is as it was written.
+    lost_bytes: bytes at the end that were not read. damaged: everything else that is not as a recorder wrote it.
     """
 
     def __init__(self, data: bytes, name: str = "recording") -> None:
@@ -98,37 +95,32 @@ class Recording:
         self.lost_bytes = 0
         self.damaged: list[Damaged] = []
         self._data = data
-        self._channels: dict[int, Channel] = {}
-        self._spare: dict[int, Channel] = {}
-        """Channels as the index tells of them."""
-        self._readable: dict[int, bool] = {}
-        """Whether messages of a channel can be read, by its id."""
-        self._left_out: dict[str, tuple[int, int]] = {}
-        """Place of the first chunk with such messages, and their number, by what is wrong with them."""
+        self._lines: dict[int, Line] = {}
+        """Lines by the ids of their channels."""
+        self._told: set[bytes] = set()
+        """Records of all channels."""
         self._mark = ChunkMark(number=-1, of="")
         """The last one that was read."""
-        self._contents = Contents()
         self._chunks: list[tuple[int, int]] = []
-        """Begin and end of each chunk's content in the file."""
-        self._indexed: ChunkIndex | None = None
-        """The chunk to which the indexes belong that come next."""
-        self._open: OrderedDict[int, bytes] = OrderedDict()
-        self._times = array("q")
+        """Begin and end of each chunk's record in the file."""
+        self._content = lru_cache(CHUNKS_KEPT)(self._unpacked)
+        self._times = array("Q")
         self._of_channel = array("H")
         self._of_chunk = array("I")
         self._places = array("I")
-        self.end = self._read()
-        """Bytes of the file up to where it may go on."""
-        for reason, (offset, number) in self._left_out.items():
-            self._damage(offset, f"{number} messages are left out: {reason}")
-        if not self.facts:
-            known = "nothing in it can be read" if not self._channels else "it is a recording of another program"
-            reason = "what it says of its beginning is damaged" if self.damaged else known
+        if bytes(data[: len(MCAP0_MAGIC)]) != MCAP0_MAGIC:
+            reason = "this is no MCAP file" if len(data) else "this file is empty, and no MCAP file"
+            raise InputRefused(Fault(reason=reason, where=name))
+        self._read()
+        if not self.facts and not self.damaged:
+            reason = "it is a recording of another program" if self._chunks else "nothing in it can be read"
             raise InputRefused(Fault(reason=reason, where=name, advice="`engage record` makes recordings"))
-        self._check_beginning()
+        if self._mark.of and self.facts.get("wall") != self._mark.of:
+            self.facts = {**self.facts, "wall": self._mark.of}
+            self._damage(0, "the time of its beginning is damaged")
         try:
-            is_readable = isfinite(self.began) and 0 <= self.wall <= LATEST
-        except ValueError:
+            is_readable = isfinite(self.began) and self.wall >= 0
+        except (KeyError, ValueError):
             is_readable = False
         if not is_readable:
             raise InputRefused(Fault(reason="what it says of its beginning is damaged", where=name))
@@ -147,12 +139,12 @@ class Recording:
     @property
     def began(self) -> Seconds:
         """Beginning of the recording, on that clock."""
-        return float(self.facts.get("began", 0.0))
+        return float(self.facts["began"])
 
     @property
     def wall(self) -> int:
         """Beginning of the recording, nanoseconds since 1970."""
-        return int(self.facts.get("wall", 0))
+        return int(self.facts["wall"])
 
     @property
     def duration(self) -> Seconds:
@@ -161,13 +153,16 @@ class Recording:
 
     @property
     def repaired(self) -> str:
-        """Findings of repairs, in words; empty: there was none that has found something."""
+        """Words about what the recording lacked of which this is a copy; empty: it is none."""
         return self.notes.get(REPAIRED, {}).get("found", "")
 
     @property
-    def contents(self) -> Contents:
-        """Everything that the end of the file tells of, or would have to."""
-        return self._contents
+    def lacks(self) -> list[str]:
+        """Words about what this recording lacks, and the one of which it is a copy; empty: nothing."""
+        found = [self.repaired] if self.repaired else []
+        if not self.has_all_data:
+            found.append(f"what came after {self.duration:.2f} s is missing")
+        return found + [f"damaged at byte {each.offset}: {each.reason}" for each in self.damaged]
 
     # -- messages -----------------------------------------------------------------------------------------------
 
@@ -180,30 +175,36 @@ class Recording:
 
     def key(self, number: int) -> str:
         """Key of a message, relative to the robot; empty for the recorder's own."""
-        channel = self._channels[self._of_channel[number]]
-        return self.sample(number).key if channel.topic == MORE else str(channel.metadata.get("key", ""))
+        line = self._lines[self._of_channel[number]]
+        return self.sample(number).key if line.topic == MORE else line.key
 
     def life(self, number: int) -> str:
         """Life that a message came from."""
-        return str(self._channels[self._of_channel[number]].metadata.get("life", ""))
+        return self._lines[self._of_channel[number]].life
 
     def number(self, number: int) -> int:
         """Number of a message in its life, modulo 2 ** 32; 0: it has none."""
-        return self._message(number).sequence
+        return self.stored(number).sequence
+
+    def stored(self, number: int) -> Stored:
+        """Return a message as it stands in the file."""
+        content, place = self._content(self._of_chunk[number]), self._places[number]
+        _, length = _HEAD.unpack_from(content, place)
+        id, sequence, log_time, publish_time = _MESSAGE.unpack_from(content, place + _HEAD.size)
+        data = content[place + _HEAD.size + _MESSAGE.size : place + _HEAD.size + length]
+        return Stored(self._lines[id], data, log_time, publish_time, sequence)
 
     def sample(self, number: int) -> Sample:
         """Return a message as it came, to the byte. at: on the clock of the recorder."""
-        channel, message = self._channels[self._of_channel[number]], self._message(number)
-        if channel.topic == MORE:
-            return msgspec.msgpack.decode(message.data, type=Sample)
-        told = channel.metadata
-        encoding, clock = told.get("encoding", ""), told.get("clock", "")
-        form = StoredForm(channel.message_encoding, message.data, told.get("typed") == "true")
+        line, data, _, publish_time, sequence = self.stored(number)
+        if line.topic == MORE:
+            one: Sample = msgspec.msgpack.decode(data, type=Sample)
+            return replace(one, key=_known(one.key))
         return Sample(
-            key=told.get("key", ""), payload=payload(form, encoding),
-            encoding=encoding, source=told.get("sender", ""), at=self.began + self.time(number),
-            past=told.get("past") == "true", life=told.get("life", ""), number=message.sequence, clock=clock,
-            sent=self.began + (message.publish_time - self.wall) / BILLION if clock else 0.0,
+            key=line.key, payload=payload(StoredForm(line.form, data, line.typed), line.encoding),
+            encoding=line.encoding, source=line.sender, at=self.began + self.time(number), past=line.past,
+            life=line.life, number=sequence, clock=line.clock,
+            sent=self.began + (publish_time - self.wall) / BILLION if line.clock else 0.0,
         )  # fmt: skip
 
     def received(self, number: int) -> Received | None:
@@ -212,9 +213,9 @@ class Recording:
 
     def own(self, topic: str) -> list[tuple[Seconds, Any]]:
         """Return what the recorder itself has said under this topic, as its type in `OWN`, with the times."""
-        channels = {id for id, channel in self._channels.items() if channel.topic == topic}
+        channels = {id for id, line in self._lines.items() if line.topic == topic}
         numbers = (number for number, channel in enumerate(self._of_channel) if channel in channels)
-        return [(self.time(each), msgspec.json.decode(self._message(each).data, type=OWN[topic])) for each in numbers]
+        return [(self.time(each), msgspec.json.decode(self.stored(each).data, type=OWN[topic])) for each in numbers]
 
     @property
     def losses(self) -> MissingMessages:
@@ -222,229 +223,110 @@ class Recording:
         told = self.own(LOST)
         return told[-1][1] if told else MissingMessages()
 
-    def indexes(self, chunk: int) -> list[MessageIndex]:
-        """Make the indexes of a chunk anew, one for each of its channels. chunk: its number."""
-        found: dict[int, MessageIndex] = {}
-        content = self._content(chunk)
-        for opcode, place, _ in _records(content):
-            if opcode == Opcode.MESSAGE:
-                channel, _, log_time, _ = _MESSAGE.unpack_from(content, place + _HEAD.size)
-                index = found.setdefault(channel, MessageIndex(channel_id=channel, records=[]))
-                index.records.append((log_time, place))
-        return list(found.values())
-
-    def checksum(self, until: int) -> int:
-        """CRC-32 of the first bytes of the file."""
-        with memoryview(self._data) as view, view[:until] as part:
-            return zlib.crc32(part)
-
-    def _message(self, number: int) -> Message:
-        chunk, place = self._of_chunk[number], self._places[number]
-        body = _body(self._content(chunk), place)
-        message: Message = Message.read(ReadDataStream(BytesIO(body)), len(body))
-        return message
-
-    def _content(self, chunk: int) -> bytes:
-        if chunk in self._open:
-            self._open.move_to_end(chunk)
-        else:
-            begin, end = self._chunks[chunk]
-            self._open[chunk] = _plain(_chunk(self._data[begin:end]))
-            if len(self._open) > CHUNKS_KEPT:
-                self._open.popitem(last=False)
-        return self._open[chunk]
-
     # -- reading ------------------------------------------------------------------------------------------------
 
-    def _read(self) -> int:
-        """Read all records. Returns where the last of those in the middle ends."""
-        data, size = self._data, len(self._data)
-        if bytes(data[: len(MCAP0_MAGIC)]) != MCAP0_MAGIC:
-            if not _BEGINNING.match(data):
-                reason = "this is no MCAP file" if size else "this file is empty, and no MCAP file"
-                raise InputRefused(Fault(reason=reason, where=self.name))
-            self._damage(0, "the mark of its format is damaged")
-        until = self._read_index()
-        self.is_whole = self.has_all_data = until is not None
-        until = size if until is None else until
-        at = good = len(MCAP0_MAGIC)
-        while at + _HEAD.size <= until:
-            opcode, length = _HEAD.unpack_from(data, at)
-            end = at + _HEAD.size + length
-            is_end = opcode == Opcode.DATA_END and end == at + _DATA_END
-            if is_end and not self.is_whole:
-                self.has_all_data = self._next_chunk(at, size) is None
-                break
+    def _read(self) -> None:
+        """Read all records up to the end of the data.
+
+        A damaged record may lie about its length: reading goes on at the next chunk that can be seen.
+        """
+        data, at = self._data, len(MCAP0_MAGIC)
+        while not self.has_all_data:
+            opcode, end = 0, len(data) + 1
             try:
-                if end > until or is_end:
-                    raise ValueError("the data does not end here" if is_end else "no record is here")
-                self._take(opcode, data[at + _HEAD.size : end], at, end)
-                at = good = end
+                opcode, length = _HEAD.unpack_from(data, at)
+                end = at + _HEAD.size + length
+                if end > len(data):
+                    raise ValueError("it is cut off")
+                self._take(opcode, at, end)
+                at = end
             except _BAD as error:
-                found = self._next_chunk(at, until)
-                if found is None and not self.is_whole:
-                    break
+                found = _CHUNK.search(data, at + 1)
+                is_passable = opcode == Opcode.CHUNK and end <= len(data)
+                if found is None and not is_passable:
+                    self.lost_bytes = len(data) - at
+                    return
                 words = str(error) if type(error) is ValueError else f"{type(error).__name__}: {error}"
                 self._damage(at, f"what is here is left out: {words}")
-                at = until if found is None else found
-        if not self.is_whole:
-            self.lost_bytes = size - good
-        self._check_data(at)
-        return good
-
-    def _read_index(self) -> int | None:
-        """Read the index behind the data. Returns where the data ends; None: it is not as it was written."""
-        data, size = self._data, len(self._data)
-        footer = size - len(MCAP0_MAGIC) - _FOOTER.size
-        if footer < 0 or bytes(data[footer + _FOOTER.size :]) != MCAP0_MAGIC:
-            return None
-        opcode, length, begin, _, checksum = _FOOTER.unpack_from(data, footer)
-        index = bytes(data[begin:footer])
-        if (opcode, length) != (Opcode.FOOTER, _FOOTER.size - _HEAD.size) or begin < len(MCAP0_MAGIC) + _DATA_END:
-            return None
-        if zlib.crc32(data[footer : footer + _FOOTER.size - 4], zlib.crc32(index)) != checksum:
-            return None
-        try:
-            for opcode, _, body in _records(index):
-                if opcode == Opcode.CHANNEL:
-                    channel = Channel.read(ReadDataStream(BytesIO(body)))
-                    self._spare[channel.id] = channel
-        except _BAD:
-            return None
-        return int(begin) - _DATA_END
-
-    def _check_data(self, at: int) -> None:
-        """Compare all data with its checksum, which is told at this place. Old recordings have none: 0."""
-        try:
-            opcode, length = _HEAD.unpack_from(self._data, at)
-            told = DataEnd.read(ReadDataStream(BytesIO(self._data[at + _HEAD.size : at + _DATA_END])))
-            is_right = told.data_section_crc in (0, self.checksum(at))
-        except _BAD:
-            opcode, length, is_right = 0, 0, False
-        is_end = (opcode, length) == (Opcode.DATA_END, _DATA_END - _HEAD.size)
-        if self.is_whole and not is_end:
-            self._damage(at, "the record at the end of the data is damaged")
-        elif is_end and not is_right and not self.damaged:  # what is damaged differs from the checksum, of course
-            self._damage(
-                at,
-                "the data differs from its checksum: something is missing, or was changed where no chunk tells of it",
-            )
-
-    def _check_beginning(self) -> None:
-        """Compare the time of the beginning with what has a checksum: a replay waits from then for the first message.
-
-        Each mark has it. Where there are no marks it is not much earlier than the first message.
-        """
-        wall, times = self._mark.of, self._times
-        if not wall and times:
-            first, last = min(times), max(times)
-            began = self.facts.get("wall", "")
-            is_near = began.isdecimal() and 0 <= first - int(began) <= max(last - first, LONGEST_SILENCE)
-            wall = began if is_near else str(first)
-        if times and wall != self.facts.get("wall", ""):
-            self.facts = {**self.facts, "wall": wall}
-            self._damage(0, "the time of its beginning is damaged")
-
-    @property
-    def another(self) -> int | None:
-        """Place behind this recording at which another one begins, of which nothing is read; None: there is none."""
-        found = self._data.find(MCAP0_MAGIC + bytes([Opcode.HEADER]), max(self.end, 1))
-        return None if found < 0 else found
+                at = end if found is None else found.start()
+        self.is_whole = self._has_index(at)
 
     def _damage(self, at: int, reason: str) -> None:
-        self._indexed = None
         self.damaged.append(Damaged(at, reason))
 
-    def _next_chunk(self, at: int, until: int) -> int | None:
-        """Find the next chunk behind a damaged record that can be read whole, before another file begins."""
-        until = min(until, self._data.find(MCAP0_MAGIC, at) % (len(self._data) + 1))
-        place = at + 1
-        while (found := _CHUNK.search(self._data, place, until)) is not None:
-            begin = found.start()
-            end = begin + _HEAD.size + _HEAD.unpack_from(self._data, begin)[1]
-            try:
-                if end <= until:
-                    _plain(_chunk(self._data[begin + _HEAD.size : end]))
-                    return begin
-            except _BAD:
-                pass
-            place = begin + 1
-        return None
-
-    def _take(self, opcode: int, body: bytes, at: int, end: int) -> None:
+    def _take(self, opcode: int, at: int, end: int) -> None:
         """Take a record of the data. Raises one of `_BAD`."""
-        stream = ReadDataStream(BytesIO(body))
         if opcode == Opcode.CHUNK:
-            self._take_chunk(_chunk(body), at, end)
-        elif opcode == Opcode.MESSAGE_INDEX:
-            if int.from_bytes(body[2:6], "little") != len(body) - 6:
-                raise ValueError("no record is here")
-            if self._indexed is not None:
-                self._indexed.message_index_offsets[MessageIndex.read(stream).channel_id] = at
-                self._indexed.message_index_length += end - at
+            self._take_chunk(at, end)
         elif opcode == Opcode.METADATA:
-            told = Metadata.read(stream)
-            self._contents.metadata.append(MetadataIndex(offset=at, length=end - at, name=told.name))
+            told = Metadata.read(_stream(self._data[at + _HEAD.size : end]))
             if told.name != PROFILE:
                 self.notes[told.name] = told.metadata
             elif not self.facts:
                 self.facts = told.metadata
-        elif opcode == Opcode.ATTACHMENT:  # of another program
-            if int.from_bytes(body[-4:], "little") not in (0, zlib.crc32(body[:-4])):
-                raise ValueError("an attachment differs from its checksum")
-        elif opcode == Opcode.HEADER:
-            Header.read(stream)
-        else:
+        elif opcode == Opcode.DATA_END:
+            checksum = DataEnd.read(_stream(self._data[at + _HEAD.size : end])).data_section_crc
+            with memoryview(self._data) as view, view[:at] as part:
+                is_right = checksum in (0, zlib.crc32(part))
+            if not is_right and not self.damaged:  # what is damaged differs from the checksum, of course
+                self._damage(at, "the data differs from its checksum: what no chunk tells of is missing, or changed")
+            self.has_all_data = True
+        elif opcode not in _PASSED_OVER:
             raise ValueError("no record is here")
 
-    def _take_chunk(self, chunk: Chunk, at: int, end: int) -> None:
+    def _has_index(self, at: int) -> bool:
+        """Tell whether an index that begins here ends the file, and agrees with its checksum."""
+        data, footer = self._data, len(self._data) - len(MCAP0_MAGIC) - _FOOTER.size
+        if footer < at:
+            return False
+        opcode, _, begin, _, checksum = _FOOTER.unpack_from(data, footer)
+        is_end = (opcode, begin) == (Opcode.FOOTER, at) and bytes(data[-len(MCAP0_MAGIC) :]) == MCAP0_MAGIC
+        return is_end and zlib.crc32(data[at : footer + _FOOTER.size - 4]) == checksum
+
+    def _take_chunk(self, at: int, end: int) -> None:
         """Take a chunk, or nothing of it. Raises one of `_BAD`."""
-        content = _plain(chunk)
+        self._chunks.append((at, end))
+        number = len(self._chunks) - 1
+        content = self._unpacked(number)
         found: list[tuple[int, int, int]] = []
-        channels: dict[int, Channel] = {}
-        schemas: list[Schema] = []
+        lines: dict[int, Line] = {}
+        new: set[bytes] = set()
         marks: list[ChunkMark] = []
-        for opcode, place, body in _records(content):
+        for opcode, place, until in _records(content):
             if opcode == Opcode.CHANNEL:
-                channel = Channel.read(ReadDataStream(BytesIO(body)))
-                if self._channels.get(channel.id, channel) != channel:
+                if (told := content[place:until]) in self._told:  # in a chunk before
+                    continue
+                channel = Channel.read(_stream(told))
+                if channel.id in self._lines:
                     raise ValueError(f"it tells of channel {channel.id} otherwise than a chunk before it")
-                channels[channel.id] = channel
-            elif opcode == Opcode.SCHEMA:
-                schemas.append(Schema.read(ReadDataStream(BytesIO(body))))
+                new.add(told)
+                lines[channel.id] = Line.of(channel)
             elif opcode == Opcode.MESSAGE:
-                id, _, log_time, _ = _MESSAGE.unpack_from(body)
-                if log_time > LATEST:
-                    raise ValueError("a time in it is none")
-                known = channels.get(id) or self._channels.get(id) or self._spare.get(id)
-                if known is not None and known.topic == CHUNK:
-                    marks.append(msgspec.json.decode(body[_MESSAGE.size :], type=ChunkMark))
-                found.append((log_time, id, place))
+                id, _, log_time, _ = _MESSAGE.unpack_from(content, place)
+                line = lines.get(id) or self._lines.get(id)
+                if line is None:
+                    raise ValueError("it does not tell of its channels")
+                if line.topic == CHUNK:
+                    marks.append(msgspec.json.decode(content[place + _MESSAGE.size : until], type=ChunkMark))
+                else:
+                    found.append((log_time, id, place - _HEAD.size))
         self._follow(marks, at)
-        new = [told for id, told in channels.items() if id not in self._channels]
-        self._contents.channels += new
-        self._channels |= channels
-        known_schemas = {each.id for each in self._contents.schemas}
-        self._contents.schemas += [each for each in schemas if each.id not in known_schemas]
-        self._indexed = ChunkIndex(
-            chunk_length=end - at, chunk_start_offset=at, compression=chunk.compression,
-            compressed_size=len(chunk.data), message_end_time=max((each[0] for each in found), default=0),
-            message_start_time=min((each[0] for each in found), default=0), message_index_length=0,
-            message_index_offsets={}, uncompressed_size=len(content),
-        )  # fmt: skip
-        self._contents.chunks.append(self._indexed)
-        self._contents.count(self._indexed, Counter(id for _, id, _ in found), len(new))
-        number = len(self._chunks)
-        self._chunks.append((at + _HEAD.size, end))
+        for id, line in lines.items():
+            self._lines[id] = replace(line, key=_known(line.key))
+            if self._lines[id] != line:
+                self._damage(at, f"messages with a key that is none of Engage are passed over: {line.key!r}")
+        self._told |= new
         for log_time, id, place in found:
-            if self._is_message(id, content, place, at):
-                self._times.append(log_time)
-                self._of_channel.append(id)
-                self._of_chunk.append(number)
-                self._places.append(place)
+            self._times.append(log_time)
+            self._of_channel.append(id)
+            self._of_chunk.append(number)
+            self._places.append(place)
 
     def _follow(self, marks: list[ChunkMark], at: int) -> None:
-        """Check that a chunk is the next one of this recording. Raises ValueError: it is not."""
+        """Check that a chunk is the next one of this recording. Raises ValueError: it is not.
+
+        marks: one; a file that another program has put together anew has chunks with none, or several.
+        """
         last = self._mark
         for mark in marks:
             if last.number >= 0 and mark.of != last.of:
@@ -454,34 +336,25 @@ class Recording:
             last = mark
         if marks and marks[0].number > self._mark.number + 1 and not self.damaged:
             self._damage(at, f"the chunks from number {self._mark.number + 1} to {marks[0].number - 1} are not here")
-        for mark in marks:
-            self.facts = mark.facts or self.facts
-            self._mark = mark
+        self._mark = last
+        self.facts = next((mark.facts for mark in marks if mark.facts), self.facts)
 
-    def _is_message(self, id: int, content: bytes, place: int, at: int) -> bool:
-        """Tell whether a message of a chunk is one to give; those that nobody can read are counted."""
-        channel = self._channels.setdefault(id, self._spare[id]) if id in self._spare else self._channels.get(id)
-        if channel is None:
-            return self._leave_out("only a damaged part told of their channels", at)
-        if channel.topic == CHUNK:
-            return False
-        key = channel.metadata.get("key", "")
-        try:
-            if channel.topic == MORE:
-                key = msgspec.msgpack.decode(_body(content, place)[_MESSAGE.size :], type=Sample).key
-            elif channel.topic in OWN:
-                msgspec.json.decode(_body(content, place)[_MESSAGE.size :], type=OWN[channel.topic])
-                return True
-        except _BAD:
-            return self._leave_out("nobody can read these words of the recorder", at)
-        if id not in self._readable or channel.topic == MORE:
-            self._readable[id] = _is_in_table(key)
-        return self._readable[id] or self._leave_out("their keys are none of Engage", at)
-
-    def _leave_out(self, reason: str, at: int) -> bool:
-        first, number = self._left_out.get(reason, (at, 0))
-        self._left_out[reason] = first, number + 1
-        return False
+    def _unpacked(self, number: int) -> bytes:
+        """Content of a chunk, compared with its checksum. Raises one of `_BAD`."""
+        begin, end = self._chunks[number]
+        chunk = Chunk.read(_stream(self._data[begin + _HEAD.size : end]))
+        size = chunk.uncompressed_size
+        if end - begin != _CHUNK_HEAD + len(chunk.compression) + len(chunk.data):
+            raise ValueError("a chunk has another length than it says")
+        if chunk.compression == "zstd" and zstandard.frame_content_size(chunk.data) not in (size, -1):
+            raise ValueError("the two sizes of a chunk differ")  # and memory for the greater one may not be there
+        if size > LARGEST_CHUNK:
+            raise ValueError(f"a chunk says that it has {size} bytes")
+        stream, length = get_chunk_data_stream(chunk)
+        content: bytes = stream.read(length)
+        if length != size or zlib.crc32(content) != chunk.uncompressed_crc:
+            raise ValueError("a chunk differs from its checksum")
+        return content
 
 
 def received(sample: Sample) -> Received | None:
@@ -496,49 +369,26 @@ def received(sample: Sample) -> Received | None:
     return Received(sample.key, message, sample.source, sample.at, sample.past, sample.life, sample.number)
 
 
-def _is_in_table(key: str) -> bool:
-    """Tell whether a key has the form of those in the table of keys."""
+def _known(key: str) -> str:
+    """The key, if it has the form of those in the table of keys; else empty, as of what nobody reads."""
     try:
-        kind = keys.key_class(key)
+        chunks, is_presence = key.split("/"), keys.key_class(key) == "alive"
     except ValueError:
-        return False
-    chunks = key.split("/")
-    # Presence has four chunks in recordings from before the part of a participant stood in its key.
-    return all(map(keys.is_chunk, chunks)) and (len(chunks) in (4, 5) if kind == "alive" else len(chunks) > 4)
+        return ""
+    is_long_enough = len(chunks) == 5 if is_presence else len(chunks) > 4
+    return key if is_long_enough and all(map(keys.is_chunk, chunks)) else ""
 
 
-def _records(content: bytes) -> Iterator[tuple[int, int, bytes]]:
-    """Kind, place and body of each record of a chunk or of the index. Raises ValueError: one is cut off."""
+def _records(content: bytes) -> Iterator[tuple[int, int, int]]:
+    """Kind, and begin and end of the body, of each record of a chunk. Raises ValueError: one is cut off."""
     place = 0
     while place < len(content):
         opcode, length = _HEAD.unpack_from(content, place)
-        if place + _HEAD.size + length > len(content):
+        begin, place = place + _HEAD.size, place + _HEAD.size + length
+        if place > len(content):
             raise ValueError("a record in it is cut off")
-        yield opcode, place, _body(content, place)
-        place += _HEAD.size + length
+        yield opcode, begin, place
 
 
-def _body(content: bytes, place: int) -> bytes:
-    """Body of the record at a place."""
-    return content[place + _HEAD.size : place + _HEAD.size + _HEAD.unpack_from(content, place)[1]]
-
-
-def _chunk(body: bytes) -> Chunk:
-    chunk: Chunk = Chunk.read(ReadDataStream(BytesIO(body)))
-    if len(chunk.data) != len(body) - (8 + 8 + 8 + 4 + 4 + len(chunk.compression) + 8):
-        raise ValueError("a chunk is cut off")
-    size = chunk.uncompressed_size
-    if chunk.compression == "zstd" and zstandard.frame_content_size(chunk.data) not in (size, -1):
-        raise ValueError("the two sizes of a chunk differ")  # and memory for the greater one may not be there
-    if size > LARGEST_CHUNK:
-        raise ValueError(f"a chunk says that it has {size} bytes")
-    return chunk
-
-
-def _plain(chunk: Chunk) -> bytes:
-    """Content of a chunk, compared with its checksum. Raises one of `_BAD`."""
-    stream, length = get_chunk_data_stream(chunk)
-    content = stream.read(length)
-    if length != chunk.uncompressed_size or zlib.crc32(content) != chunk.uncompressed_crc:
-        raise ValueError("a chunk differs from its checksum")
-    return content
+def _stream(body: bytes) -> ReadDataStream:
+    return ReadDataStream(BytesIO(body))

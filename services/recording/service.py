@@ -14,17 +14,14 @@ from engage_hri.schemas.messages import Message, encode, encoding_of
 from engage_hri.schemas.status import AskStatus
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Sample, Tap
-from engage_hri.services.recording.disk import RecordingFile, Tell
+from engage_hri.services.recording.disk import FULL_CHUNK, RecordingFile, Tell
 from engage_hri.services.recording.form import JSON, MSGPACK, kept
 from engage_hri.services.recording.losses import CLOCK, LOST, MORE, MissingMessages, Offset
 from engage_hri.services.recording.reading import BILLION
 from engage_hri.services.recording.writing import Line
-from engage_hri.services.runtime.absent import Absent
 
 FLUSH: Seconds = 0.4
 """Longest time that a message waits until its chunk goes to the disk: a recorder that is killed loses no more."""
-LARGEST_CHUNK = 1024 * 1024
-"""Bytes, before compression, from which on a chunk goes to the disk at once."""
 LOOK: Seconds = 1.0
 """Time between two looks at clocks of others and at what was lost."""
 STILL: Seconds = 1.0
@@ -46,33 +43,24 @@ class Recorder:
         self._began = began
         self._wall = wall
         self._known_before = bus.health.dropped
-        self._lines: dict[tuple[object, ...], Line] = {}
-        self._heard: Absent[tuple[object, ...]] = Absent()
         self._offsets: dict[str, Seconds] = {}
         self._still: Seconds = 0.0
 
     def take(self, sample: Sample) -> None:
         """Put a message into the file's next chunk."""
         form = kept(sample)
-        own = (form.encoding, form.is_typed)
-        name = (sample.key, sample.source, sample.life, sample.clock, sample.encoding, sample.past, *own)
-        line = self._lines.get(name)
-        if line is None:
-            line = Line(
-                topic=f"{self._bus.robot}/{sample.key}", form=form.encoding, key=sample.key, sender=sample.source,
-                life=sample.life, clock=sample.clock, encoding=sample.encoding, is_past=sample.past,
-                is_typed=form.is_typed,
-            )  # fmt: skip
-            if not self._file.writer.knows(line):
-                self._own(MORE, msgspec.msgpack.encode(sample), MSGPACK)
-                return
-            self._lines[name] = line
-        self._heard.leaves(name, self._bus.now())
+        line = Line(
+            f"{self._bus.robot}/{sample.key}", form.encoding, key=sample.key, sender=sample.source, life=sample.life,
+            clock=sample.clock, encoding=sample.encoding, past=sample.past, typed=form.is_typed,
+        )  # fmt: skip
+        if not self._file.writer.has_room(line):
+            self._own(MORE, msgspec.msgpack.encode(sample), MSGPACK)
+            return
         log_time = self._nanoseconds(sample.at)
         sent = self._bus.local(Stamp(sample.clock, sample.sent)) if sample.clock else sample.at
         self._file.writer.add(line, form.data, log_time, self._nanoseconds(sent), sample.number)
         self.messages += 1
-        if self._file.writer.size > LARGEST_CHUNK:
+        if self._file.writer.size > FULL_CHUNK:
             self._file.write()
 
     def told(self, key: str, message: Message, source: str) -> None:
@@ -87,9 +75,7 @@ class Recorder:
         )
 
     def look(self) -> None:
-        """Note what has changed of other machines' clocks and of what was lost, and forget who was long silent."""
-        for name in self._heard.forgotten(self._bus.now()):
-            self._file.writer.forget(self._lines.pop(name))
+        """Note what has changed of other machines' clocks and of what was lost."""
         changed = {
             each.clock: Offset(offset=each.offset, error=each.error)
             for each in self._bus.health.clocks
@@ -118,7 +104,7 @@ class Recorder:
         """End the file. Returns False if something found no room on the disk."""
         self.look()
         note = {"messages": str(self.messages), "lost": str(self.losses.total)}
-        self.is_whole = is_whole = self._file.close(note)
+        self.is_whole = is_whole = self._file.close({"end": note})
         self.losses = replace(self.losses, disk=self._file.dropped)  # what waited for room to the end, too
         return is_whole
 

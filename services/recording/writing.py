@@ -1,8 +1,9 @@
 """Writer of MCAP files in chunks that stand for themselves: messages in, bytes out. Pure; needs the extra `record`.
 
-A chunk is sealed whenever its writer wants, and complete on the disk it can be read, whatever becomes of the rest.
-`mcap.writer` seals one only when it is full, which may take minutes; so the records are put together here, each by
-the library's own code.
+A chunk is sealed whenever its writer wants, and complete on the disk it can be read, whatever becomes of the rest:
+it tells of its place in the recording, and of the channels of its messages. `mcap.writer` seals a chunk only when it
+is full, which may take minutes, and tells of each channel once; so the records are put together here, each by the
+library's own code.
 """
 
 import json
@@ -11,7 +12,6 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
-from hashlib import blake2b
 from typing import Protocol
 
 import msgspec
@@ -35,17 +35,15 @@ from mcap.records import (
     SummaryOffset,
 )
 from mcap.writer import MCAP0_MAGIC
-from msgspec import Struct, field
+from msgspec import Struct
 
 from engage_hri.schemas.export import bundle
 from engage_hri.services.recording.form import JSON
 from engage_hri.services.recording.losses import CHUNK, ChunkMark
 
 PROFILE = "engage"
-REPAIRED = "engage-repaired"
-"""Name of the note of a repair: what it has found, in words."""
-MOST_CHANNELS = 60_000
-"""Number of channels: MCAP has room for 65 535."""
+MOST_CHANNELS = 20_000
+"""Number of channels that the writer keeps in memory, some 500 bytes each. MCAP has room for 65 535."""
 LEVEL = 3
 """Effort of the compression, 1 to 22: at 3 some 100 MB/s."""
 SCHEMA = 1
@@ -55,8 +53,8 @@ SCHEMA = 1
 class Line(Struct, frozen=True):
     """Messages that share a channel: of one key, sender, life, clock, encoding, and either past or not.
 
-    sender: participant. is_past: from before the recording. form: encoding of its messages in the file. is_typed: as
-    of `Form`.
+    sender: participant. past: from before the recording. form: encoding of its messages in the file. typed: as
+    `is_typed` of `StoredForm`.
     """
 
     topic: str
@@ -66,32 +64,40 @@ class Line(Struct, frozen=True):
     life: str = ""
     clock: str = ""
     encoding: str = ""
-    is_past: bool = False
-    is_typed: bool = False
+    past: bool = False
+    typed: bool = False
 
-    def metadata(self) -> dict[str, str]:
-        named = {
-            "key": self.key, "sender": self.sender, "life": self.life, "clock": self.clock,
-            "encoding": self.encoding, "past": "true" if self.is_past else "",
-            "typed": "true" if self.is_typed else "",
-        }  # fmt: skip
-        return {name: value for name, value in named.items() if value}
+    @classmethod
+    def of(cls, channel: Channel) -> "Line":
+        """The line of a channel in a file."""
+        told = channel.metadata
+        words = {name: told.get(name, "") for name in ("key", "sender", "life", "clock", "encoding")}
+        past, typed = (told.get(name) == "true" for name in ("past", "typed"))
+        return cls(channel.topic, channel.message_encoding, **words, past=past, typed=typed)
+
+    def channel(self, id: int) -> Channel:
+        told = {name: str(getattr(self, name)) for name in ("key", "sender", "life", "clock", "encoding")}
+        told |= {"past": "true" if self.past else "", "typed": "true" if self.typed else ""}
+        metadata = {name: value for name, value in told.items() if value}
+        schema = SCHEMA if self.key and self.form == JSON else 0
+        return Channel(
+            id=id, topic=self.topic, message_encoding=self.form, schema_id=schema, metadata=metadata
+        )  # fmt: skip
 
 
 _MARKS = Line(topic=CHUNK, form=JSON)
 
 
 class Sealed(Struct):
-    """A chunk that is not in the file yet. index: its offsets count from its own beginning. channels: told in it.
+    """A chunk that is not in the file yet. index: its offsets count from its own beginning.
 
-    messages: number of those of the bus.
+    counts: its messages by channel. messages: number of those of the bus.
     """
 
     data: bytes
     index: ChunkIndex
     counts: Counter[int]
     messages: int
-    channels: list[Channel]
 
 
 class Records(Protocol):
@@ -104,13 +110,10 @@ class Records(Protocol):
 
 
 class Writer:
-    """The records of one file. waiting: messages that are in no chunk yet.
+    """The records of one file. waiting: messages that are in no chunk yet."""
 
-    Its memory is bounded, if its user forgets lines: of each channel it keeps two numbers and a digest of 16 bytes.
-    """
-
-    def __init__(self, channels: Records | None = None, chunks: Records | None = None) -> None:
-        """channels, chunks: where to put their records for the end of the file; in memory by default."""
+    def __init__(self, chunks: Records | None = None) -> None:
+        """chunks: where to put what the end of the file tells of each chunk; in memory by default."""
         self.waiting = 0
         self._of_bus = 0
         self._facts: Mapping[str, str] = {}
@@ -120,49 +123,54 @@ class Writer:
         self._compressor = zstandard.ZstdCompressor(level=LEVEL)
         self._indices: dict[int, MessageIndex] = {}
         self._first = self._last = 0
-        self._channels: dict[Line, int] = {}
-        """Ids of the lines that were heard of late."""
-        self._channel_ids: dict[bytes, int] = {}
-        """Ids of all lines, by digest: whoever comes back gets the same channel."""
-        self._untold: set[int] = set()
-        """Channels that are in no chunk on its way to the file, since theirs was dropped."""
-        self._new: list[Channel] = []
-        self._has_schema = False
-        self._totals = Totals()
-        self._told: Records = [] if channels is None else channels
+        self._channel_ids: dict[Line, int] = {}
+        self._metadata: list[MetadataIndex] = []
         self._chunks: Records = [] if chunks is None else chunks
+        self._totals = Statistics(
+            attachment_count=0, channel_count=0, channel_message_counts={}, chunk_count=0, message_count=0,
+            message_start_time=0, message_end_time=0, metadata_count=0, schema_count=1,
+        )  # fmt: skip
 
     @property
     def size(self) -> int:
         """Bytes of the chunk so far, before compression."""
         return self._chunk.count
 
-    def begin(self, metadata: Mapping[str, str]) -> bytes:
-        """Beginning of a file. The first chunk tells the facts again, where they have a checksum."""
-        self._facts = metadata
-        head = written(Header(profile=PROFILE, library="engage"))
-        offset = len(MCAP0_MAGIC) + len(head)
-        return MCAP0_MAGIC + head + self.told(PROFILE, metadata, offset)
+    def begin(self, facts: Mapping[str, str]) -> bytes:
+        """Beginning of a file: its facts, and again in a first chunk, where they have a checksum."""
+        self._facts = facts
+        head = MCAP0_MAGIC + written(Header(profile=PROFILE, library="engage"))
+        head += self.told(PROFILE, facts, len(head))
+        _schema().write(self._chunk)
+        self._mark(int(facts["wall"]))
+        sealed = self.seal()
+        assert sealed is not None
+        self.placed(sealed, len(head))
+        return head + sealed.data
 
     def told(self, name: str, metadata: Mapping[str, str], offset: int) -> bytes:
         """Facts about the recording, to be written at this offset."""
         data = written(Metadata(name=name, metadata=dict(metadata)))
-        self._totals.metadata.append(MetadataIndex(offset=offset, length=len(data), name=name))
+        self._metadata.append(MetadataIndex(offset=offset, length=len(data), name=name))
         return data
 
     def add(self, line: Line, data: bytes, log_time: int, publish_time: int, sequence: int = 0) -> None:
         """Add a message to the chunk. Times in nanoseconds since 1970."""
         if not self.waiting:
-            facts = {} if self._number else dict(self._facts)
-            mark = msgspec.json.encode(ChunkMark(number=self._number, of=self._facts.get("wall", ""), facts=facts))
-            self._first = self._last = log_time
-            self._add(_MARKS, mark, log_time, log_time, 0)
+            self._mark(log_time)
         self._add(line, data, log_time, publish_time, sequence)
 
+    def _mark(self, now: int) -> None:
+        facts = {} if self._number else dict(self._facts)
+        mark = msgspec.json.encode(ChunkMark(number=self._number, of=self._facts["wall"], facts=facts))
+        self._first = self._last = now
+        self._add(_MARKS, mark, now, now, 0)
+
     def _add(self, line: Line, data: bytes, log_time: int, publish_time: int, sequence: int) -> None:
-        channel = self._channel(line)
+        channel = self._channel_ids.setdefault(line, len(self._channel_ids) + 1)
         index = self._indices.get(channel)
-        if index is None:
+        if index is None:  # each chunk can be read without those before it
+            line.channel(channel).write(self._chunk)
             index = self._indices[channel] = MessageIndex(channel_id=channel, records=[])
         index.records.append((log_time, self._chunk.count))
         self._first, self._last = min(self._first, log_time), max(self._last, log_time)
@@ -174,33 +182,9 @@ class Writer:
         )  # fmt: skip
         message.write(self._chunk)
 
-    def knows(self, line: Line) -> bool:
+    def has_room(self, line: Line) -> bool:
         """True if a message of this line needs no further channel, or there is room for one."""
-        return len(self._channel_ids) < MOST_CHANNELS or line in self._channels or _digest(line) in self._channel_ids
-
-    def forget(self, line: Line) -> None:
-        """Forget a line that was not heard of for long, but not its channel."""
-        self._channels.pop(line, None)
-
-    def _channel(self, line: Line) -> int:
-        id = self._channels.get(line)
-        if id is None:
-            new = len(self._channel_ids) + 1
-            id = self._channels[line] = self._channel_ids.setdefault(_digest(line), new)
-            if id == new:
-                self._untold.add(id)
-        if (is_new := id in self._untold) or line is _MARKS:  # each chunk can be read without those before it
-            self._untold.discard(id)
-            schema = SCHEMA if line.key and line.form == JSON else 0
-            channel = Channel(
-                id=id, topic=line.topic, message_encoding=line.form, schema_id=schema, metadata=line.metadata()
-            )
-            if schema and not self._has_schema:
-                self._has_schema = True
-                _schema().write(self._chunk)
-            channel.write(self._chunk)
-            self._new += [channel] if is_new else []
-        return id
+        return len(self._channel_ids) < MOST_CHANNELS or line in self._channel_ids
 
     def seal(self) -> Sealed | None:
         """End the chunk and begin another. None: it has no messages."""
@@ -227,9 +211,8 @@ class Writer:
             ),
             Counter({channel: len(index.records) for channel, index in self._indices.items()}),
             self._of_bus,
-            self._new,
         )  # fmt: skip
-        self._indices, self.waiting, self._of_bus, self._new = {}, 0, 0, []
+        self._indices, self.waiting, self._of_bus = {}, 0, 0
         self._number += 1
         return sealed
 
@@ -238,88 +221,45 @@ class Writer:
         offsets = {channel: offset + at for channel, at in sealed.index.message_index_offsets.items()}
         index = replace(sealed.index, chunk_start_offset=offset, message_index_offsets=offsets)
         self._chunks.append(written(index))
-        for channel in sealed.channels:
-            self._told.append(written(channel))
-            if channel.schema_id:
-                self._totals.schemas = [_schema()]
-        self._totals.count(index, sealed.counts, len(sealed.channels))
-
-    def dropped(self, sealed: Sealed) -> None:
-        """Note that the last chunk will never be in the file: what it told of its channels has to be told again."""
-        self._number -= 1
-        self._untold |= {channel.id for channel in sealed.channels}
-        if any(channel.schema_id for channel in sealed.channels):
-            self._has_schema = False
-
-    def finish(self, offset: int, checksum: int) -> Iterator[bytes]:
-        """End of the file, to be written at this offset, behind the last chunk. checksum: of all before."""
-        return end(self._totals, self._told, self._chunks, offset, checksum)
-
-
-class Totals(Struct):
-    """Contents of the end of a file, but for its channels and chunks, which are only counted."""
-
-    schemas: list[Schema] = []
-    metadata: list[MetadataIndex] = []
-    statistics: Statistics = field(
-        default_factory=lambda: Statistics(
-            attachment_count=0, channel_count=0, channel_message_counts={}, chunk_count=0, message_count=0,
-            message_start_time=0, message_end_time=0, metadata_count=0, schema_count=0,
-        )
-    )  # fmt: skip
-
-    def count(self, chunk: ChunkIndex, counts: Counter[int], channels: int) -> None:
-        """Count a chunk. counts: its messages by channel. channels: number of those that no chunk before told of."""
-        known, begin = self.statistics, chunk.message_start_time
+        known, begin = self._totals, index.message_start_time
         known.message_start_time = min(known.message_start_time, begin) if known.chunk_count else begin
-        known.message_end_time = max(known.message_end_time, chunk.message_end_time)
+        known.message_end_time = max(known.message_end_time, index.message_end_time)
         known.chunk_count += 1
-        known.channel_count += channels
-        known.message_count += counts.total()
-        for channel, number in counts.items():
+        known.message_count += sealed.counts.total()
+        for channel, number in sealed.counts.items():
             known.channel_message_counts[channel] = known.channel_message_counts.get(channel, 0) + number
 
+    def dropped(self) -> None:
+        """Note that the last chunk will never be in the file."""
+        self._number -= 1
 
-class Contents(Totals):
-    """Everything in a file that its end has to tell of."""
+    def finish(self, offset: int, checksum: int) -> Iterator[bytes]:
+        """End of the file, to be written at this offset, piece by piece: where everything is, for readers that seek.
 
-    channels: list[Channel] = []
-    chunks: list[ChunkIndex] = []
-
-
-def end(
-    totals: Totals, channels: Iterable[bytes], chunks: Iterable[bytes], offset: int, checksum: int
-) -> Iterator[bytes]:
-    """End of a file, to be written at this offset, piece by piece: where everything is, for readers that seek.
-
-    channels, chunks: their records. checksum: CRC-32 of all bytes before.
-    """
-    yield (data := written(DataEnd(data_section_crc=checksum)))
-    start = at = offset + len(data)
-    known = totals.statistics
-    known.metadata_count, known.schema_count = len(totals.metadata), len(totals.schemas)
-    groups: list[tuple[Opcode, Iterable[bytes]]] = [
-        (Opcode.SCHEMA, map(written, totals.schemas)),
-        (Opcode.CHANNEL, channels),
-        (Opcode.STATISTICS, [written(known)]),
-        (Opcode.CHUNK_INDEX, chunks),
-        (Opcode.METADATA_INDEX, map(written, totals.metadata)),
-    ]
-    crc, told = 0, b""
-    for opcode, pieces in groups:
-        begin = at
-        for piece in pieces:
-            crc, at = zlib.crc32(piece, crc), at + len(piece)
-            yield piece
-        if at > begin:
-            told += written(SummaryOffset(opcode, begin, at - begin))
-    footer = written(Footer(summary_start=start, summary_offset_start=at, summary_crc=0))
-    crc = zlib.crc32(told + footer[:-4], crc)
-    yield told + written(Footer(summary_start=start, summary_offset_start=at, summary_crc=crc)) + MCAP0_MAGIC
-
-
-def _digest(line: Line) -> bytes:
-    return blake2b(msgspec.msgpack.encode(line), digest_size=16).digest()
+        checksum: CRC-32 of all bytes before.
+        """
+        yield (data := written(DataEnd(data_section_crc=checksum)))
+        start = at = offset + len(data)
+        known = self._totals
+        known.channel_count, known.metadata_count = len(self._channel_ids), len(self._metadata)
+        groups: list[tuple[Opcode, Iterable[bytes]]] = [
+            (Opcode.SCHEMA, [written(_schema())]),
+            (Opcode.CHANNEL, (written(line.channel(id)) for line, id in self._channel_ids.items())),
+            (Opcode.STATISTICS, [written(known)]),
+            (Opcode.CHUNK_INDEX, self._chunks),
+            (Opcode.METADATA_INDEX, map(written, self._metadata)),
+        ]
+        crc, told = 0, b""
+        for opcode, pieces in groups:
+            begin = at
+            for piece in pieces:
+                crc, at = zlib.crc32(piece, crc), at + len(piece)
+                yield piece
+            if at > begin:
+                told += written(SummaryOffset(opcode, begin, at - begin))
+        footer = written(Footer(summary_start=start, summary_offset_start=at, summary_crc=0))
+        crc = zlib.crc32(told + footer[:-4], crc)
+        yield told + written(Footer(summary_start=start, summary_offset_start=at, summary_crc=crc)) + MCAP0_MAGIC
 
 
 @cache

@@ -48,7 +48,7 @@ from engage_hri.services.requests.admission import borrowed, misplaced
 from engage_hri.services.requests.asking import Asking
 from engage_hri.services.requests.asking_table import AskingState
 from engage_hri.services.requests.patience import Patience
-from engage_hri.services.requests.pending import Pending
+from engage_hri.services.requests.pending import News, Pending
 from engage_hri.services.requests.records import unwieldy
 from engage_hri.services.requests.serving import Serving
 from engage_hri.services.runtime.alarm import Alarm
@@ -79,29 +79,36 @@ class Requester:
         self._listening: asyncio.Task[None] | None = None
         self._broken: EngageError | None = None
 
-    def send(self, key: str, request: Request, within: Seconds | None = None) -> Pending:
+    def send(
+        self,
+        key: str,
+        request: Request,
+        within: Seconds | None = None,
+        tell: Callable[[News], None] | None = None,
+    ) -> Pending:
         """Publish the request and keep at it. A known id is an update: the newest content is what is sent again.
 
-        key: the expression of the command (`keys.BLOCK`). within: seconds until it is cancelled. An update of a
+        key: the expression of the command (`keys.BLOCK`). within: seconds until it is cancelled. tell: see
+        `Pending`; not for an update. An update of a
         request that is being cancelled is void. An id that a live request of another kind has, or one that was given
         up, is refused at once.
         """
         if self._broken is not None:
-            return self._failed(key, request, self._broken)
+            return self._failed(key, request, self._broken, tell)
         if self._listens and self._listening is None:
             self._listen()
         effects = self._asking.send(key, request, self._bus.now(), within)
         match effects:
             case [asking_effects.TellEnd(end=EngageError() as error)]:
-                return self._failed(key, request, error)
+                return self._failed(key, request, error, tell)
         if (pending := self._pending.get(request.id)) is None:
-            pending = self._pending[request.id] = Pending(key, request)
+            pending = self._pending[request.id] = Pending(key, request, tell)
         pending.request = self._asking.request(request.id) or request
         self._carry_out(effects)
         return pending
 
-    def _failed(self, key: str, request: Request, error: EngageError) -> Pending:
-        pending = Pending(key, request)
+    def _failed(self, key: str, request: Request, error: EngageError, tell: Callable[[News], None] | None) -> Pending:
+        pending = Pending(key, request, tell)
         pending.end(error)
         return pending
 

@@ -24,7 +24,7 @@ class Hand(Struct, frozen=True):
     is_asked: bool
 
 
-class HoldRequest(Struct, frozen=True):
+class HoldRequest(Struct, frozen=True, tag="hold_request"):
     """Tell the service to hold the request of this name, since nobody renews it, or to go on with it.
 
     until: when it ends unless it is renewed; None: it goes on. why: what has happened, and whose it was.

@@ -92,8 +92,9 @@ class NotedIntake:
         """Carry out what a step led to. The steps are told before: a recording has all that its events came from."""
         due = self._ledger.deadline
         if outputs or self._ledger.is_full or (due is not None and due <= now):
-            told = self._ledger.portion(now, is_heard=self._bus.is_heard(self._key))
-            if told is not None:
-                self._bus.publish(self._key, told)
+            with self._bus.containing("the ledger"):  # whatever it cannot tell is carried out all the same
+                told = self._ledger.portion(now, is_heard=self._bus.is_heard(self._key))
+                if told is not None:
+                    self._bus.publish(self._key, told)
         for output in outputs:
             self._carry_out(output)

@@ -13,6 +13,8 @@ P = ParamSpec("P")
 Steps = Generator[int, None, T]
 """Work in steps; returns its result."""
 
+SLICE = 512
+"""Elements that are worked on in one go: one to five milliseconds. Counted: equal runs stay equal."""
 PORTION = 64
 """Number of a block's elements that are looked at between two pauses."""
 

@@ -4,10 +4,7 @@ import asyncio
 from collections.abc import Coroutine
 from typing import Any
 
-from engage_hri.services.runtime.steps import Steps, T
-
-SLICE = 512
-"""Elements that are worked on in one go (see `steps`): one to five milliseconds. Counted: equal runs stay equal."""
+from engage_hri.services.runtime.steps import SLICE, Steps, T
 
 
 async def unhurried(steps: Steps[T]) -> T:

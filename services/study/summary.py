@@ -56,9 +56,6 @@ def pooled(records: Iterable[SessionRecord], kind: EventKind) -> KindStatistics:
         delay_min=min(known(part.delay_min for part in parts), default=None),
         delay_mean=_weighted((part.delay_mean, part.succeeded) for part in parts),
         delay_max=max(known(part.delay_max for part in parts), default=None),
-        failed_delay_min=min(known(part.failed_delay_min for part in parts), default=None),
-        failed_delay_mean=_weighted((part.failed_delay_mean, part.failed) for part in parts),
-        failed_delay_max=max(known(part.failed_delay_max for part in parts), default=None),
     )  # fmt: skip
 
 

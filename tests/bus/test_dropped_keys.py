@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from engage_hri.schemas import keys
 from engage_hri.services.bus.zenoh.order import Follower, Missing, Past, SentLog, Written
 from tests.bus.test_order import answer, write
+from tests.random_cases import share_of
 
 KEPT = 6
 LONG = 1000
@@ -94,7 +95,7 @@ STEPS = st.lists(
 
 
 @given(STEPS)
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=share_of(300), deadline=None)
 def test_whatever_keys_come_and_go_each_message_comes_once_in_order_and_what_is_lost_is_counted(
     steps: list[Any],
 ) -> None:

@@ -22,6 +22,7 @@ from engage_hri.services.bus.zenoh.hub import ZenohHub
 from engage_hri.services.bus.zenoh.order import Envelope
 from engage_hri.services.bus.zenoh.session import Arrived, open_session
 from tests.bus.places import PATIENCE, MemoryPlace, Place, ZenohPlace, state, take
+from tests.random_cases import share_of
 
 pytestmark = pytest.mark.each_bus(shared=False)
 EVENTS = (keys.FEEDBACK, keys.BLOCK, keys.request_state("realizer"))
@@ -250,7 +251,7 @@ def crash(hub: ZenohHub) -> None:
     hub.session.close()  # type: ignore[no-untyped-call]
 
 
-@pytest.mark.parametrize(("seed", "loss"), [(seed, loss) for seed in range(6) for loss in (0.0, 0.2)])
+@pytest.mark.parametrize(("seed", "loss"), [(seed, loss) for seed in range(share_of(6, 3)) for loss in (0.0, 0.2)])
 async def test_each_reader_sees_what_it_must_whoever_comes_goes_crashes_or_lies(place: Place, seed: int, loss: float):
     story = Story(place, seed, loss)
     try:

@@ -10,6 +10,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.limits import BESIDE, SMALL
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.zenoh.order import PULSE_FOR, Envelope, Follower, Past, SentLog, Written, fitting
+from tests.random_cases import share_of
 
 KEYS = (keys.BLOCK, keys.FEEDBACK, keys.SYNC_POINT, keys.INHIBIT)
 NUMBERS = st.integers(1, 10**9)
@@ -58,7 +59,7 @@ class Wire:
 
 
 @given(st.lists(st.tuples(st.sampled_from(KEYS), st.sampled_from([0, 1, 1, 2]), st.booleans(), st.booleans())))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=share_of(100), deadline=None)
 def test_every_message_is_delivered_once_and_in_the_order_of_its_key_whatever_gets_lost(
     steps: list[tuple[str, int, bool, bool]],
 ):
@@ -145,7 +146,7 @@ STEPS = st.one_of(
 
 
 @given(st.lists(STEPS, max_size=60))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=share_of(300), deadline=None)
 def test_whatever_others_claim_in_the_name_of_a_process_its_own_messages_come_once_and_in_order(steps: list[Any]):
     wire = Deceived()
 

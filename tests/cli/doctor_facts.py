@@ -10,7 +10,6 @@ from engage_hri.schemas.units import Stamp
 from engage_hri.services.doctor.facts import (
     BodyFacts,
     EndpointFacts,
-    Package,
     ParticipantFacts,
     SystemFacts,
     WorldFacts,
@@ -39,7 +38,6 @@ def well(**changes: Any) -> SystemFacts:
     """A robot on two machines, with nothing to complain of. changes: of the facts."""
     facts = SystemFacts(
         robot="robot", at=AT, version="0.1.0", protocol=keys.PREFIX, own=OWN, services=keys.SERVICES,
-        packages=(Package(name="numpy", wanted=">=1.26", version="2.4.6"),),
         doors=(
             EndpointFacts(endpoint="tls/router:7447", is_local=False, is_closed=True, until=int(AT) + 365 * 86400),
         ),

@@ -3,9 +3,7 @@
 import asyncio
 import io
 import json
-import shlex
 import socket
-import sys
 from pathlib import Path
 
 import msgspec
@@ -19,11 +17,10 @@ from engage_hri.services.doctor.facts import (
     BodyFacts,
     Certificate,
     EndpointFacts,
-    Package,
     ParticipantFacts,
     SystemFacts,
 )
-from engage_hri.services.doctor.findings import Diagnosis, findings, satisfies
+from engage_hri.services.doctor.findings import Diagnosis, findings
 from engage_hri.services.doctor.matrix import HERE, matrix
 from engage_hri.services.doctor.report import as_json, report
 from tests.cli.command import Engage, start
@@ -44,18 +41,6 @@ def hidden(*places: str) -> SystemFacts:
 
 
 ILL: dict[str, tuple[SystemFacts, str, str, str]] = {
-    "a package is missing": (
-        well(packages=(Package(name="lxml", wanted=">=5.2"),)),
-        "wrong",
-        "lxml",
-        "not installed; Engage needs lxml>=5.2",
-    ),
-    "a package is old": (
-        well(packages=(Package(name="lxml", wanted=">=5.2", version="5.1.9"),)),
-        "wrong",
-        "lxml",
-        "version 5.1.9 is here",
-    ),
     "keys cannot be used": (
         well(bus=False, known=(), problem=Fault(reason="expired", where="keys/viewer", advice="renew")),
         "wrong",
@@ -222,26 +207,6 @@ def test_all_findings_together_come_with_the_worst_first() -> None:
     assert [each.severity for each in findings(facts)] == ["wrong", "doubtful", "note"]
 
 
-@pytest.mark.parametrize(
-    ("wanted", "version", "fits"),
-    [
-        (">=1.26", "2.0", True),
-        (">=1.26", "1.9", False),
-        ("==1.10.2", "1.10.2", True),
-        ("==1.10.2", "1.10.3", False),
-        (">=13,<15", "15.0", False),
-        (">=13,<15", "14.9.1", True),
-        ("", "1", True),
-        (">=1.26", "", False),
-        ("==1.10", "1.10.0", True),
-        (">=2.0", "2.0.0rc1", True),
-        ("!=1.2", "1.2", False),
-    ],
-)
-def test_versions_are_compared_as_numbers(wanted: str, version: str, fits: bool) -> None:
-    assert satisfies(Package(name="any", wanted=wanted, version=version)) == fits
-
-
 def test_the_matrix_has_a_row_for_each_that_answers_and_a_column_for_all() -> None:
     facts = hidden("tcp/10.0.0.3:1")
     facts = msgspec.structs.replace(
@@ -365,11 +330,3 @@ def test_what_cannot_be_is_refused(engage: Engage) -> None:
     told = engage("doctor", "--connect", "nowhere")
     assert (told.code, told.out) == (2, "")
     assert "'nowhere' is not an endpoint" in told.err
-
-
-def test_a_package_is_installed_by_the_python_that_runs() -> None:
-    (found,) = findings(well(packages=(Package(name="lxml", wanted=">=5.2"),)))
-
-    python, *arguments = shlex.split(found.do)
-    assert Path(python).absolute() == Path(sys.executable).absolute()
-    assert arguments == ["-m", "pip", "install", "lxml>=5.2"]

@@ -165,7 +165,7 @@ COMMANDS_THAT_PRINT = {
     "reasons as json": ("plan", "ask.xml", "--why", "--format", "json"),
     "tool": ("tool",),
     "play": ("play", "ask.xml", "--embedded", "--virtual-time"),
-    "simulate": ("simulate", "--human", "table-2-1", "--sessions", "8", "--jobs", "2", "--out", "study"),
+    "simulate": ("simulate", "--limit", "12", "--sessions", "2", "--jobs", "2", "--out", "study"),
     "help": ("--help",),
     "version": ("--version",),
 }

@@ -15,6 +15,7 @@ from engage_hri.services.client.inputs import block_in, call_in, fragment_in
 from engage_hri.services.client.language_models import perform_call, stream
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.control.testing.plugin import virtual_loop
+from tests.random_cases import share_of
 
 
 class Unshown:
@@ -84,7 +85,7 @@ CALLS: dict[str, Callable[[Robot, Any], Any]] = {
 
 
 @given(value=VALUES)
-@settings(max_examples=30)
+@settings(max_examples=share_of(30))
 @pytest.mark.parametrize("name", CALLS)
 def test_a_robot_takes_any_value_or_refuses_it_in_words(name: str, value: Any) -> None:
     async def ask() -> None:

@@ -10,6 +10,7 @@ from engage_hri.schemas.tool import Gesture, Part, Refer, Say
 from engage_hri.services.client.chunking import Chunk, Chunker
 from engage_hri.services.text.ear import heard
 from engage_hri.services.text.pieces import Ids
+from tests.random_cases import share_of
 
 
 def chunks(*pieces: str | Part, **settings: int) -> list[Chunk]:
@@ -120,7 +121,7 @@ texts = st.text(st.sampled_from(list("ab .,!?[]\n\"'DrM好。，」ขั")), ma
 ).map("".join)
 
 
-@settings(max_examples=200)
+@settings(max_examples=share_of(200))
 @given(texts, st.data())
 def test_it_does_not_matter_in_what_bits_the_text_comes(text: str, data: st.DataObject) -> None:
     cuts = sorted(data.draw(st.lists(st.integers(0, len(text)), max_size=8)))

@@ -20,6 +20,7 @@ from engage_hri.schemas.syncref import SYNC_POINTS, SyncRef
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from tests.conformance.case import Case, cases
+from tests.random_cases import share_of
 from tests.schemas.grammar import violations
 from tests.schemas.strategies import without_lines
 
@@ -113,7 +114,7 @@ def _verdict(block: Block) -> object:
         return error.fault.line, re.sub("'[^']*'", "", error.fault.reason)
 
 
-@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=share_of(80), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(any_blocks())
 def test_any_block_has_the_same_net_in_each_dialect(block: Block) -> None:
     draft = encode_xml(block)
@@ -126,7 +127,7 @@ def test_any_block_has_the_same_net_in_each_dialect(block: Block) -> None:
     assert meaning(encode_xml(in_dialect(in_dialect(block, "bml-1.0"), "draft"))) == meaning(draft)
 
 
-@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=share_of(80), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(any_blocks(every=True))
 def test_any_block_is_bml_1_0_once_spelled_so(block: Block) -> None:
     written = encode_xml(in_dialect(block, "bml-1.0"))

@@ -150,10 +150,10 @@ class Halfway(SimulatedBody):
     """Follows half the way of what it looks at."""
 
     def see(self, world: World) -> None:
-        before = self._torso.world
+        before = self.moves.world
         moved = tuple(
             each
-            if (old := before.entity(each.id)) is None or not self._torso.runs.get("head")
+            if (old := before.entity(each.id)) is None or not self.moves.runs.get("head")
             else replace(each, position=tuple((a + b) / 2 for a, b in zip(old.position, each.position, strict=True)))
             for each in world.entities
         )

@@ -207,8 +207,12 @@ class Greedy(SimulatedBody):
     """Moves the head for a shift though a look has it."""
 
     def set_out(self, behavior, authority):
-        is_greedy = isinstance(behavior, GazeShift)
-        return self._begin(behavior, authority) if is_greedy else super().set_out(behavior, authority)
+        if isinstance(behavior, GazeShift):
+            self.moves.is_overlaid = lambda: False
+        try:
+            return super().set_out(behavior, authority)
+        finally:
+            self.moves.__dict__.pop("is_overlaid", None)
 
 
 # -- what is predicted --------------------------------------------------------------------------------------------

@@ -17,7 +17,9 @@ from engage_hri.services.control.contract.body import BodyState, Reached
 from engage_hri.services.control.contract.extras import GIVES_WAY
 from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.figure.alive import CLOSED, CLOSING, OPENING, Blinks, closure
-from engage_hri.services.control.testing import CROWDS, WORLD, Stage, performed, recorded, violations, witnessed
+from engage_hri.services.control.testing import WORLD, Stage, performed
+from engage_hri.services.control.testing.motions import recorded, violations
+from engage_hri.services.control.testing.witness import CROWDS, witnessed
 from engage_hri.services.control.torso.body import SimulatedBody
 from tests.control.directing import robot
 

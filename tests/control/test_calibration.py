@@ -39,6 +39,7 @@ from engage_hri.services.control.testing import WORLD, Stage, performed, times
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.runtime.service import running
 from tests.control.directing import robot
+from tests.random_cases import share_of
 
 PARTS = ("head", "left_arm", "right_arm")
 OFF = {
@@ -223,7 +224,7 @@ async def true_errors(
     return beside
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(share_of(4)))
 async def test_a_corrected_body_points_right_and_within_what_is_stated(seed: int) -> None:
     """At places where nothing was measured, by forward kinematics of the test's own."""
     chance = Random(seed)

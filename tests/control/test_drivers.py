@@ -110,9 +110,15 @@ async def test_a_driver_is_made_with_its_settings():
     assert body.settings == Port(baud=4800)
 
 
+def _forget_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another test may have named its driver so, and its folder stays on Python's path."""
+    monkeypatch.delitem(sys.modules, "my_robot", raising=False)
+    monkeypatch.setattr(sys, "path", [each for each in sys.path if not Path(each, "my_robot.py").exists()])
+
+
 async def test_a_module_may_lie_in_the_current_folder(file: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(file.parent)
-    monkeypatch.delitem(sys.modules, "my_robot", raising=False)  # of another test, which has named its driver so
+    _forget_others(monkeypatch)
 
     assert type(_made(ControlConfig(body="my_robot:Mine"))).__name__ == "Mine"
     sys.modules.pop("my_robot")

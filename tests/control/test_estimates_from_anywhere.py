@@ -34,8 +34,9 @@ from engage_hri.schemas.references import type_name
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.contract.body import BodyState, MovementAuthority, Reached
 from engage_hri.services.control.figure import kinematics
-from engage_hri.services.control.figure.tracks import Track
-from engage_hri.services.control.testing import Stage, aside
+from engage_hri.services.control.figure.tracks import PartTrack
+from engage_hri.services.control.testing import Stage
+from engage_hri.services.control.testing.laws import aside
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.runtime.virtual_time import run_virtual
 
@@ -129,11 +130,11 @@ async def errors(chance: Random) -> list[Error]:
 
 async def compared(body: SimulatedBody, behavior: BlockBehavior, estimate: Estimate, world: World) -> list[Error]:
     """Perform a behavior, and compare what comes with what was said."""
-    trunk = body._torso.tracks["torso"]
+    trunk = body.moves.tracks["torso"]
     type, is_moving = type_name(behavior), trunk.is_moving(asyncio.get_running_loop().time())
     times: dict[str, float] = {}
     states: dict[str, BodyState] = {}
-    track = body._torso.tracks.get(estimate.parts[0] if estimate.parts else "", trunk)
+    track = body.moves.tracks.get(estimate.parts[0] if estimate.parts else "", trunk)
     way = [track.angles(asyncio.get_running_loop().time())]
     turns = isinstance(behavior, Gaze | Pointing)
     following = asyncio.create_task(follow(track, way) if turns else asyncio.sleep(0.0))
@@ -163,7 +164,7 @@ async def compared(body: SimulatedBody, behavior: BlockBehavior, estimate: Estim
     entity = world.entity(behavior.target)
     assert entity is not None
     # A nod lies on top of the look, and is no part of where the head is.
-    if any(abs(angle) > 1e-9 for angle in body._torso.tracks["nod"].angles(times[on])) and "head" in estimate.parts:
+    if any(abs(angle) > 1e-9 for angle in body.moves.tracks["nod"].angles(times[on])) and "head" in estimate.parts:
         return found
     if "stroke" in times:
         note("degrees beside the target at stroke", math.degrees(aside(seen("stroke"), entity.position)))
@@ -182,7 +183,7 @@ async def compared(body: SimulatedBody, behavior: BlockBehavior, estimate: Estim
     return found
 
 
-async def follow(track: Track, way: list[tuple[float, ...]]) -> None:
+async def follow(track: PartTrack, way: list[tuple[float, ...]]) -> None:
     """Note the angles of a part, again and again."""
     while True:
         way.append(track.angles(asyncio.get_running_loop().time()))

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from engage_hri.services.control.figure import tracks
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import JointMotion, Leg, Path, resting
+from tests.random_cases import share_of
 
 LIMITS = tracks.LIMITS["right_arm"]
 HOME = tracks.HOME["right_arm"]
@@ -133,7 +134,7 @@ def poses(draw: st.DrawFn) -> tuple[float, float, float]:
 EXTENSIONS = st.lists(st.tuples(st.floats(0.0, 0.7), st.floats(0.0, 1.3)), max_size=4)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(one=poses(), other=poses(), first=st.floats(0.01, 1.0), extensions=EXTENSIONS, cruise=st.floats(0.2, 1.0))
 def test_no_authority_makes_it_pass_its_limit_turn_back_or_break_a_joints_limits(
     one: tuple[float, float, float],
@@ -176,7 +177,7 @@ def test_a_crossing_is_where_the_motion_is_at_that_time(
     assert motion.s(crossing) == pytest.approx(s, abs=1e-9)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(one=poses(), other=poses(), at=st.floats(0.0, 1.0))
 def test_a_new_path_takes_over_without_a_jump(
     one: tuple[float, float, float], other: tuple[float, float, float], at: float

@@ -17,7 +17,8 @@ from engage_hri.schemas.body import AbortBehavior, BehaviorAborted, BehaviorOutc
 from engage_hri.schemas.references import type_name
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.contract.body import Arrived, MovementAuthority, Progress, Reached, Spoke
-from engage_hri.services.control.serving.progress_check import SKEW, Told
+from engage_hri.services.control.serving.progress_check import SKEW, Told, sound
+from engage_hri.services.control.serving.steps import Nonsense
 from engage_hri.services.control.testing import BEHAVIORS
 from tests.control.directing import robot
 from tests.control.test_drivers import Bare
@@ -73,7 +74,7 @@ LIES: dict[str, tuple[tuple[Any, ...], str, int]] = {
     "backwards": ((*GOOD[:3], GOOD[1]), "tells 'ready' after 'stroke_start'", 3),
     "left out": ((GOOD[0], GOOD[2]), "tells 'stroke_start' without 'ready' before it", 1),
     "unknown": ((GOOD[0], reached("lunch")), "tells 'lunch', and a gaze has the points start", 1),
-    "nothing": ((GOOD[0], reached(None)), "tells None, and a gaze has", 1),
+    "nothing": ((GOOD[0], reached(None)), "tells None, which is no name of a sync point", 1),
     "no progress": ((GOOD[0], None), "tells a NoneType, which is no progress", 1),
     "never": ((reached("start", float("nan")),), "tells 'start' at nan, which is no time of the loop", 0),
     "words": ((lambda now: Reached("start", "now", now),), "tells 'start' at 'now', which is no time", 0),
@@ -155,7 +156,8 @@ SPEECH = Speech(id="look", text="one two")
 )
 def test_words_go_on_in_their_text(positions: tuple[Any, ...], reason: str):
     told = Told(SPEECH, MovementAuthority(SPEECH, "end"), 0.0)
-    flaws = [told.flaw(Spoke("word", position, 0.0), 0.0) for position in positions]
+    spoken = [sound(Spoke("word", position, 0.0)) for position in positions]
+    flaws = [each.what if isinstance(each, Nonsense) else told.flaw(each, 0.0) for each in spoken]
 
     assert flaws == [""] * (len(positions) - 1) + [reason]
 

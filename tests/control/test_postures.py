@@ -1,11 +1,9 @@
 """Estimates of postures alone against full ones: the same but for the phases, whatever the body does meanwhile."""
 
 import asyncio
-import math
 import random
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
-from unittest.mock import patch
 
 import pytest
 from msgspec.structs import replace
@@ -27,13 +25,8 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.config import Displaced, Variability
 from engage_hri.services.control.contract.body import MovementAuthority
 from engage_hri.services.control.figure import kinematics
-from engage_hri.services.control.figure.tracks import limits_of, meets_table
-from engage_hri.services.control.motion.path import JointMotion, Leg, Path, resting
-from engage_hri.services.control.torso import postures
 from engage_hri.services.control.torso.body import SimulatedBody
-from engage_hri.services.control.torso.outlines import Asked, outlines
 from engage_hri.services.runtime.steps import finished
-from engage_hri.services.runtime.unhurried import SLICE
 
 ROUNDING = 1e-9
 """Degrees by which an estimate of a posture may differ from a full one. Seen: 1e-12."""
@@ -97,7 +90,6 @@ async def performing(body: SimulatedBody, *behaviors: BlockBehavior) -> AsyncIte
 @pytest.mark.parametrize("seed", range(6))
 async def test_at_rest_from_any_pose_they_are_the_same(seed: int) -> None:
     chance = random.Random(seed)
-    laid = 0
     for _ in range(8):
         seen, body = world(chance), SimulatedBody()
         poses: list[BodyPose | None] = [None, *(pose(chance) for _ in range(4))]
@@ -105,9 +97,8 @@ async def test_at_rest_from_any_pose_they_are_the_same(seed: int) -> None:
             items = questions(chance, poses)
             brief = body.rehearse(items, seen)
             assert_same(brief, in_full(body, items, seen))
-            laid += sum(bool(each.phases) for each in brief)
+            assert not any(each.phases for each in brief)
             poses += [pose for each in brief for pose in (each.pose_after, each.pose_end) if pose is not None]
-    assert laid < 0.2 * 8 * 3 * 12
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -167,61 +158,6 @@ async def test_where_only_degrees_are_asked_neither_poses_nor_rays_are_told() ->
     for one, other in zip(told, body.rehearse(items, seen), strict=True):
         assert one == (replace(other, **bare) if not other.phases else other)
     assert sum(each.ray is None for each in told) > 6
-
-
-# -- outlines against paths that are laid -------------------------------------------------------------------------
-
-
-def test_an_outline_says_what_the_path_says_or_nothing() -> None:
-    """Raising legs that need more time, legs near the table, legs in motion: anything goes."""
-    chance, asked, told = random.Random(3), [], 0
-    limits = limits_of(("left_arm",))
-
-    def angles() -> tuple[float, ...]:
-        return tuple(chance.uniform(each.low, each.high) for each in limits)
-
-    def speeds() -> tuple[float, ...]:
-        return tuple(chance.uniform(-1.0, 1.0) * chance.choice((0.0, 0.3, 2.0)) for _ in limits)
-
-    for _ in range(600):
-        legs = tuple(
-            Leg(goal=angles(), velocity=speeds() if number < 3 else (), seconds=chance.uniform(0.05, 1.5))
-            for number in range(4)
-        )
-        asked.append(Asked(angles(), speeds(), legs, 2, True, ("left_arm",)))
-    for each, degrees in zip(asked, outlines(asked), strict=True):
-        start = JointMotion(*(resting(values).q for values in (each.start, each.speeds, (0.0, 0.0, 0.0))))
-        path = Path(start, each.legs, limits)
-        if degrees is not None:
-            told += 1
-            until = sum(segment.seconds for segment in path._segments[:2])
-            assert degrees == pytest.approx(math.degrees(path.travel(until)), abs=ROUNDING)
-            assert not meets_table(path, kinematics.joints_of("left_arm"))
-    assert told > 20
-
-
-# -- in steps -----------------------------------------------------------------------------------------------------
-
-
-async def test_a_question_is_answered_in_slices_of_a_few_motions() -> None:
-    chance = random.Random(5)
-    seen, body = world(chance), SimulatedBody()
-    items = [item for _ in range(10) for item in questions(chance, [None, pose(chance)])]
-    at_once = []
-
-    def counted(asked: Sequence[Asked]) -> list[float | None]:
-        at_once.append(len(asked))
-        return outlines(asked)
-
-    with patch.object(postures, "outlines", counted):
-        worked, slices = 0, 0
-        for elements in body.rehearse_in_steps(items, seen):
-            worked += elements
-            if worked >= SLICE:
-                worked, slices = 0, slices + 1
-
-    assert slices >= 5
-    assert max(at_once) <= postures.AT_ONCE
 
 
 async def test_all_is_answered_as_of_the_instant_of_the_question() -> None:

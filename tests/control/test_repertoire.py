@@ -25,7 +25,8 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.figure.repertoire import BUILT_IN, TABLES, Absent, GesturePath, HeadPath, Repertoire
-from engage_hri.services.control.testing import WORLD, Stage, performed, recorded, stops, times, violations
+from engage_hri.services.control.testing import WORLD, Stage, performed, times
+from engage_hri.services.control.testing.motions import recorded, stops, violations
 from engage_hri.services.control.torso.body import SimulatedBody
 
 PAGE = Path(__file__).parents[2] / "docs" / "control.md"

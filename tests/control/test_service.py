@@ -29,7 +29,8 @@ from engage_hri.schemas.requests import Outcome
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.config import Displaced, Slow, Variability
-from engage_hri.services.control.testing import STEP, WORLD
+from engage_hri.services.control.testing import WORLD
+from engage_hri.services.control.testing.motions import STEP
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 from tests.commanding import command

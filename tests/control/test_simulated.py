@@ -29,9 +29,12 @@ from engage_hri.schemas.body import NoPointZone
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.contract.bell import Bell
 from engage_hri.services.control.contract.body import Arrived, BehaviorRefused, MovementAuthority
-from engage_hri.services.control.testing import WORLD, Stage, default, performed, recorded, stops, times, violations
+from engage_hri.services.control.testing import WORLD, Stage, performed, times
+from engage_hri.services.control.testing.motions import recorded, stops, violations
+from engage_hri.services.control.testing.stage import default
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.runtime.virtual_time import run_virtual
+from tests.random_cases import share_of
 
 ARMS = ("LEFT_HAND", "RIGHT_HAND")
 
@@ -325,7 +328,7 @@ STORY = st.lists(
 )  # fmt: skip
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=share_of(25), deadline=None)
 @given(story=STORY)
 def test_no_story_breaks_a_limit_or_leaves_an_arm_in_the_air(story: list[tuple[BlockBehavior, str, float, str]]):
     async def tell() -> None:

@@ -13,7 +13,8 @@ from engage_hri.schemas.body import Estimate
 from engage_hri.services.control.config import Slow, Variability
 from engage_hri.services.control.contract.body import Body, MovementAuthority
 from engage_hri.services.control.figure.sizing import SIZES
-from engage_hri.services.control.testing import WORLD, Recording, recorded, times, violations
+from engage_hri.services.control.testing import WORLD, times
+from engage_hri.services.control.testing.motions import Recording, recorded, violations
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.random_cases import share_of

@@ -14,6 +14,7 @@ from engage_hri.schemas.world import World
 from engage_hri.services.control.contract.body import MovementAuthority, Progress, Spoke
 from engage_hri.services.control.serving.words_for_voice import estimate_of, progress_of, spoken
 from engage_hri.services.control.torso.body import SimulatedBody
+from tests.random_cases import share_of
 
 
 def given_to(text: str, **more: object) -> Speech:
@@ -85,7 +86,7 @@ def test_an_estimate_tells_what_is_not_said() -> None:
     assert told.degraded == "stage directions were not said: [laughs]"
 
 
-@settings(max_examples=200)
+@settings(max_examples=share_of(200))
 @given(st.lists(st.sampled_from([*"ab *_`[]<>&#\n!", "😊", "[laughs]", "&amp;", "x_1"]), max_size=40).map("".join))
 def test_places_keep_their_order_and_the_last_word_is_all_of_the_text(text: str) -> None:
     speech = Speech(id="s", text=text, marks=tuple(Mark(f"m{place}", place) for place in range(len(text) + 1)))

@@ -14,9 +14,9 @@ from engage_hri.services.control.figure import choreography, kinematics
 from engage_hri.services.control.figure.repertoire import BUILT_IN, extended
 from engage_hri.services.control.motion.path import Path
 from engage_hri.services.control.testing import WORLD, Stage, performed
-from engage_hri.services.control.torso import table_clearance
 from engage_hri.services.control.torso.body import SimulatedBody
-from engage_hri.services.runtime.unhurried import SLICE
+from engage_hri.services.control.torso.table_clearance import ClearOfTable
+from engage_hri.services.runtime.steps import SLICE
 
 DEEP = "[pose]\nDEEP = { torso = { lean = 25 } }\n"
 
@@ -39,7 +39,7 @@ def work(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
     monkeypatch.setattr(choreography, "plan", watched("plans", choreography.plan, lambda *_: 1))
     monkeypatch.setattr(Path, "__init__", watched("paths", Path.__init__, lambda *_: 1))
     monkeypatch.setattr(kinematics, "above_table", watched("poses", kinematics.above_table, poses))
-    monkeypatch.setattr(table_clearance, "check", watched("checks", table_clearance.check, lambda *_: 1))
+    monkeypatch.setattr(ClearOfTable, "check", watched("checks", ClearOfTable.check, lambda *_: 1))
     return counted
 
 

@@ -8,7 +8,8 @@ from engage_hri.schemas.behaviors import Gaze, Pointing, Speech
 from engage_hri.services.control.config import ControlConfig, Displaced, Slow, Stall, Variability
 from engage_hri.services.control.contract.body import BehaviorRefused, BodyFailed, Reached, Spoke
 from engage_hri.services.control.contract.variability import Deviations, configured, is_lost, normal
-from engage_hri.services.control.testing import WORLD, Stage, performed, poses_agree, times
+from engage_hri.services.control.testing import WORLD, Stage, performed, times
+from engage_hri.services.control.testing.laws import poses_agree
 from engage_hri.services.control.torso.body import SimulatedBody
 
 POINT = Pointing(id="p", target="near-right")

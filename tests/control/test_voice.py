@@ -12,6 +12,7 @@ from engage_hri.services.control.contract.body import MovementAuthority, Spoke
 from engage_hri.services.control.voice.speaking import speak
 from engage_hri.services.control.voice.timeline import utter
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop, run_virtual
+from tests.random_cases import share_of
 
 
 def test_words_take_time_by_their_letters_and_pauses_by_their_punctuation():
@@ -120,7 +121,7 @@ def test_what_has_been_said_is_always_a_beginning_of_the_text(text: str):
     assert not words or said == "".join(text.split())
 
 
-@settings(max_examples=200)
+@settings(max_examples=share_of(200))
 @given(text=SPOKEN, more=SPOKEN)
 def test_more_text_never_takes_less_time(text: str, more: str):
     assert utter(text + more).seconds >= utter(text).seconds - 1e-9

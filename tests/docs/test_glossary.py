@@ -42,7 +42,7 @@ class Code:
                         self.names.add(node.name)
                     case ast.Assign() | ast.AnnAssign():
                         targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-                        self.names |= {ast.unparse(target) for target in targets}
+                        self.names |= {target.id for target in targets if isinstance(target, ast.Name)}
                     case ast.Constant(value=str() as text):
                         self.words.add(text)
         for name, above in bases.items():

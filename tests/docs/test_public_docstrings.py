@@ -5,6 +5,7 @@ import builtins
 import inspect
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -196,10 +197,11 @@ def _takes_all(handler: ast.ExceptHandler) -> bool:
     return handler.type is not None and "EngageError" in ast.unparse(handler.type)
 
 
+@cache
 def _found(called: str, owner: str) -> Function | None:
     """`self._ask` in the class, `checked` in any of the files."""
     for module in CALLS_INTO:
-        for node in ast.parse(_source(module)).body:
+        for node in _tree(module).body:
             if isinstance(node, Function) and node.name == called:
                 return node
             if isinstance(node, ast.ClassDef) and node.name == owner and called.startswith("self."):
@@ -207,6 +209,11 @@ def _found(called: str, owner: str) -> Function | None:
                     if isinstance(each, Function) and f"self.{each.name}" == called:
                         return each
     return None
+
+
+@cache
+def _tree(module: ModuleType) -> ast.Module:
+    return ast.parse(_source(module))
 
 
 def _source(module: ModuleType) -> str:

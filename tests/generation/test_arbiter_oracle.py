@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from engage_hri.services.generation.head import arbiter, maintenance_policy, response_policy
 from tests.generation.head_table import TICK, TIMES, HeadTable
 from tests.generation.heads import Stage, act, event, inhibition, statistics, world
+from tests.random_cases import share_of
 
 
 class Both:
@@ -99,7 +100,7 @@ HAPPENINGS = st.sampled_from(
 STORIES = st.lists(st.tuples(HAPPENINGS, st.sampled_from([0, 1, 2, 3, 5, 8, 16, 40])), max_size=30)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=share_of(300), deadline=None)
 @given(STORIES)
 def test_whatever_happens_the_owner_and_the_shifts_are_those_of_the_table(
     story: list[tuple[tuple[object, ...], int]],

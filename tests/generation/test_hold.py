@@ -25,7 +25,7 @@ async def test_the_head_stops_and_never_turns_back_towards_home(hub: MemoryHub, 
         stage.send(says("a", "beginning", "one two three four five six seven eight", Gaze(id="g", target="left")))
         await stage.until("a:g:start")
         await asyncio.sleep(since)
-        head = body._torso.tracks["head"]
+        head = body.moves.tracks["head"]
         there = np.array(head.motion.at(math.inf).q)
         ahead = there - np.array(head.at(loop.time()).q)
         command(stage.bus, keys.INHIBIT, Inhibit(id="l", requester="t", part="gaze", mode="hold", ttl=60.0))
@@ -46,11 +46,11 @@ async def test_a_head_on_its_target_does_not_move_at_all(hub: MemoryHub) -> None
         stage.send(says("a", "beginning", "one two three four five six seven eight", Gaze(id="g", target="left")))
         await stage.until("a:g:start")
         await asyncio.sleep(1.0)
-        stood = body._torso.tracks["head"].at(loop.time()).q
+        stood = body.moves.tracks["head"].at(loop.time()).q
         command(stage.bus, keys.INHIBIT, Inhibit(id="l", requester="t", part="gaze", mode="hold", ttl=60.0))
         moved = []
         for _ in range(int(6.0 / STEP)):
             await asyncio.sleep(STEP)
-            moved.append(float(np.abs(body._torso.tracks["head"].at(loop.time()).q - stood).max()))
+            moved.append(float(np.abs(body.moves.tracks["head"].at(loop.time()).q - stood).max()))
 
     assert max(moved) < 1e-6

@@ -82,7 +82,7 @@ def test_of_one_or_two_references_the_best_of_all_sequences_is_chosen(problem: P
     assert_best(problem, optimum(problem))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=share_of(30), deadline=None)
 @given(problems(3, 3, 5))
 def test_of_three_references_the_best_of_all_sequences_is_chosen(problem: Problem) -> None:
     best = optimum(problem)
@@ -91,13 +91,13 @@ def test_of_three_references_the_best_of_all_sequences_is_chosen(problem: Proble
     assert best == optimum_by_gestures(problem)  # which the next test relies on
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=share_of(25), deadline=None)
 @given(problems(4, 4, 2))
 def test_of_four_references_with_two_phrases_the_best_of_all_sequences_is_chosen(problem: Problem) -> None:
     assert_best(problem, optimum(problem))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(problems(4, 5, 5))
 def test_of_five_references_with_five_phrases_the_best_of_all_sequences_of_gestures_is_chosen(
     problem: Problem,
@@ -129,7 +129,7 @@ def test_what_holds_for_every_choice(problem: Problem) -> None:
             assert pair.reason
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(problems(1, 3, 4), st.randoms(use_true_random=False))
 def test_the_order_of_the_options_decides_nothing_but_ties(problem: Problem, random: object) -> None:
     def shuffled(reference: Reference) -> Reference:

@@ -13,7 +13,7 @@ from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.messages import encode
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.generation import fragment_runner
+from engage_hri.services.generation import fragments
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.requests.ends import Patience, RequestRefused
 from engage_hri.services.requests.serving import GRACE
@@ -248,7 +248,7 @@ async def test_a_fragment_waits_for_the_world_and_not_for_ever(hub: MemoryHub) -
 async def test_fragments_that_wait_for_the_world_count_among_those_that_may_wait(
     hub: MemoryHub, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fragment_runner, "FRAGMENTS", 2)
+    monkeypatch.setattr(fragments, "FRAGMENTS", 2)
     async with stage(hub, world=None) as partners:
         for id in "ab":
             partners.send(says(id))

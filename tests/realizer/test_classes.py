@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from engage_hri.services.realizer.plan.instants import Classes, instants
 from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Term
 from engage_hri.services.realizer.points import ORIGIN, Point
-from engage_hri.services.runtime.steps import finished
+from tests.random_cases import share_of
 
 POINTS = [Point("b", f"p{number}") for number in range(7)]
 Graph = dict[Point, dict[Point, tuple[float, int]]]
@@ -69,7 +69,7 @@ TIES = st.lists(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=share_of(300), deadline=None)
 @given(TIES, st.booleans())
 def test_what_is_tied_is_so_far_apart_and_a_contradiction_tells_how_far_and_why(
     said: list[Said], is_tried: bool
@@ -129,7 +129,7 @@ def check_contradiction(
     assert named == sorted({*said, line})
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=share_of(200), deadline=None)
 @given(TIES)
 def test_instants_are_points_at_no_distance_and_the_lines_between_lead_there(said: list[Said]) -> None:
     classes, graph = Classes(), dict[Point, dict[Point, tuple[float, int]]]()
@@ -138,7 +138,7 @@ def test_instants_are_points_at_no_distance_and_the_lines_between_lead_there(sai
             graph.setdefault(point(first), {}).setdefault(point(second), (here - there, line))
             graph.setdefault(point(second), {}).setdefault(point(first), (there - here, line))
 
-    found = finished(instants(classes, POINTS))
+    found = instants(classes, POINTS)
     assert sorted(each for instant in found for each in instant.points) == POINTS
     for instant in found:
         earliest = instant.points[0]
@@ -185,7 +185,7 @@ def test_instants_that_differ_by_less_than_a_microsecond_are_one() -> None:
     for number, seconds in ((1, 0.9e-6), (2, 1.2e-6), (3, 2.0e-6)):
         classes.tie(Equal((Term(POINTS[0], seconds, "x"), Term(POINTS[number], 0.0, "y"))), "b")
 
-    found = finished(instants(classes, POINTS[:4][::-1]))
+    found = instants(classes, POINTS[:4][::-1])
     assert [each.points for each in found] == [(POINTS[1], POINTS[0]), (POINTS[3], POINTS[2])]
     assert classes.tie_if_possible(Equal((Term(POINTS[0], 0.9e-6, "x"), Term(POINTS[0], 0.0, "y"))))
     assert not classes.tie_if_possible(Equal((Term(POINTS[0], 1.1e-6, "x"), Term(POINTS[0], 0.0, "y"))))

@@ -24,6 +24,7 @@ from engage_hri.services.realizer.plan.deadlocks import Loss, Losses
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.plan.words import way_round
+from tests.random_cases import share_of
 from tests.realizer.way_round import UNSAID, closed_by_behaviors, read
 
 Operator = Synchronize | After | Before
@@ -101,7 +102,7 @@ def rings(draw: st.DrawFn) -> Ring:
     return ring
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share_of(150), deadline=None)
 @given(rings())
 def test_a_refusal_tells_the_points_and_lines_of_the_circle_and_no_others(ring: Ring) -> None:
     with pytest.raises(BlockRefused) as refusal:

@@ -23,7 +23,7 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.services.realizer.plan.handover import Turn
 from engage_hri.services.realizer.plan.known import NOTHING, Known, holders_of, qualified
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.planner import plan_steps
+from engage_hri.services.realizer.plan.planner import plan_tries
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.points import Point
 from tests.random_cases import share_of
@@ -52,14 +52,14 @@ TIMES = ("0", "0.25", "0.5", "0.9", "1", "1.5", "2")
 def planned(
     example: Block, elastic: tuple[float, float] = (1.0, 1.0), known: Known = NOTHING, turns: Iterable[Turn] = ()
 ) -> Plan:
-    """The plan, if it takes no more than so many steps."""
+    """The plan, if it takes no more than so many tries."""
     body = FakeBody(elastic=elastic)
-    steps = plan_steps(
+    tries = plan_tries(
         example, [body.estimate(each) for each in example.behaviors], known=known, turns=frozenset(turns)
     )
     for _ in range(MOST):
         try:
-            next(steps)
+            next(tries)
         except StopIteration as end:
             made: Plan = end.value
             return made

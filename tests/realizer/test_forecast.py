@@ -15,6 +15,7 @@ from engage_hri.services.realizer.foresee.from_scratch import full_forecast
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
+from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.player import Player
 from tests.realizer.test_properties import blocks
@@ -28,7 +29,7 @@ def planned(block: Block, elastic: tuple[float, float]) -> Plan | None:
         return None
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=share_of(80), deadline=None)
 @given(
     blocks(),
     st.sampled_from(((1.0, 1.0), (0.5, 3.0))),

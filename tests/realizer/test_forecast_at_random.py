@@ -19,6 +19,7 @@ from engage_hri.services.realizer.foresee.forecast import Forecast
 from engage_hri.services.realizer.foresee.from_scratch import full_forecast, is_predictive
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place, PlaceKind, Transition
 from engage_hri.services.realizer.points import Member, Point
+from tests.random_cases import share_of
 from tests.realizer.facts_at_random import BEGAN, Arc, Case, Story
 
 CLOSE = 1e-5
@@ -29,7 +30,7 @@ def subsets(bounds: list[Arc]) -> Iterable[tuple[Arc, ...]]:
     return chain.from_iterable(combinations(bounds, size) for size in range(len(bounds), -1, -1))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share_of(150), deadline=None)
 @given(st.integers(0, 10**6))
 def test_what_is_expected_is_the_earliest_that_keeps_all_or_as_much_as_can_be(seed: int) -> None:
     """Nothing can give way here but upper bounds."""
@@ -52,7 +53,7 @@ def test_what_is_expected_is_the_earliest_that_keeps_all_or_as_much_as_can_be(se
         story.tell()
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share_of(150), deadline=None)
 @given(st.integers(0, 10**6))
 def test_phases_give_way_within_their_limits_where_all_can_be_kept_by_that(seed: int) -> None:
     story = Story(random.Random(seed), is_elastic=True)

@@ -4,12 +4,11 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Gesture, Speech
-from engage_hri.services.realizer.plan.given_up import times_of
+from engage_hri.services.realizer.plan.given_up import Times
 from engage_hri.services.realizer.plan.known import Known
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Relations, Term
 from engage_hri.services.realizer.points import ORIGIN, Point
-from engage_hri.services.runtime.steps import finished
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import at, plan, timed, warnings
 from tests.realizer.stage import block
@@ -21,7 +20,7 @@ def test_a_tie_through_what_is_dropped_is_given_up_last_even_if_it_is_in_the_way
     """What is in the way is the tie to the nod; but that was dropped, and the tie stands for others behind it."""
     through = Equal((Term(END, 0.0, "s:end"), Term(NOD, 0.0, "n:end")))
     time = Equal((Term(END, 0.0, "s:end"), Term(ORIGIN, 2.0, "2")), "s")
-    times = finished(times_of({"s"}, Relations((through, time), (), frozenset())))
+    times = Times(Relations((through, time), (), frozenset()), {"s"})
 
     assert times.give_up([END], {NOD}, {"n"}) == (END, "s:end = 2")
     assert times.give_up([END], {NOD}, {"n"}) == (END, "s:end = n:end")
@@ -31,7 +30,7 @@ def test_a_tie_through_what_is_dropped_is_given_up_last_even_if_it_is_in_the_way
 def test_what_is_in_the_way_is_given_up_before_what_is_not() -> None:
     through = Equal((Term(END, 0.0, "s:end"), Term(NOD, 0.0, "n:end")))
     time = Equal((Term(END, 0.0, "s:end"), Term(ORIGIN, 2.0, "2")), "s")
-    times = finished(times_of({"s"}, Relations((through, time), (), frozenset())))
+    times = Times(Relations((through, time), (), frozenset()), {"s"})
 
     assert times.give_up([END], {NOD}, ()) == (END, "s:end = n:end")
 
@@ -40,7 +39,7 @@ def test_of_two_times_of_one_point_the_own_one_is_given_up_first_wherever_it_sta
     through = Equal((Term(END, 0.0, "s:end"), Term(NOD, 0.0, "n:end")))
     time = Equal((Term(END, 0.0, "s:end"), Term(ORIGIN, 2.0, "2")), "s")
     for relations in ((through, time), (time, through)):
-        times = finished(times_of({"s"}, Relations(relations, (), frozenset())))
+        times = Times(Relations(relations, (), frozenset()), {"s"})
 
         assert times.give_up([END], (), ()) == (END, "s:end = 2")
 
@@ -48,7 +47,7 @@ def test_of_two_times_of_one_point_the_own_one_is_given_up_first_wherever_it_sta
 def test_what_one_speech_has_given_up_the_other_cannot_give_up_again() -> None:
     other = Point("t", "end")
     tie = Equal((Term(END, 0.0, "s:end"), Term(other, 0.0, "t:end")))
-    times = finished(times_of({"s", "t"}, Relations((tie,), (), frozenset())))
+    times = Times(Relations((tie,), (), frozenset()), {"s", "t"})
 
     assert times.give_up([END], (), ()) == (END, "s:end = t:end")
     assert times.give_up([other], (), ()) is None

@@ -14,6 +14,7 @@ from engage_hri.schemas.body import Estimate, Phase, WordTime
 from engage_hri.services.realizer.foresee.experience import Experience
 from engage_hri.services.realizer.foresee.utterances import Utterances
 from engage_hri.services.realizer.plan.phases import chain
+from tests.random_cases import share_of
 
 
 class Definition(Struct):
@@ -69,7 +70,7 @@ class Definition(Struct):
         return since
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=share_of(200), deadline=None)
 @given(st.integers(0, 10**9))
 def test_a_voice_teaches_what_the_definition_says(seed: int) -> None:
     chance = Random(seed)

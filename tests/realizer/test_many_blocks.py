@@ -220,7 +220,7 @@ def test_many_blocks_leave_the_robot_safe(story: tuple[Sent, ...], faults: objec
             assert ends.keys() <= outcomes.keys()
             assert seen.away_from_home() == {}
             assert not seen.body.state().moving
-            assert seen.body._torso.runs == {}
+            assert seen.body.moves.runs == {}
         assert asyncio.all_tasks() == {asyncio.current_task()}
 
     run_virtual(main())

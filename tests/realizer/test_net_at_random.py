@@ -24,6 +24,7 @@ from engage_hri.services.realizer.net.petri_net import (
     order,
 )
 from engage_hri.services.realizer.points import Point
+from tests.random_cases import share_of
 from tests.realizer.planning import at, plan, timed
 from tests.realizer.pnml_reader import read_pnml
 from tests.realizer.stage import after, before, block, together
@@ -60,7 +61,7 @@ def cycles_hold_tokens(net: PetriNet) -> bool:
     return all(a != b for a, b in empty)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=share_of(200), deadline=None)
 @given(marked(), st.lists(st.integers(0, 4), max_size=8))
 def test_the_game_of_tokens_is_played_by_its_rules(net: PetriNet, wishes: list[int]) -> None:
     marking = tuple(int(place.kind == "idle") for place in net.places)
@@ -87,7 +88,7 @@ def test_the_game_of_tokens_is_played_by_its_rules(net: PetriNet, wishes: list[i
     assert tuple(found.marking) == marking
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=share_of(200), deadline=None)
 @given(marked(), st.sets(st.integers(0, 4), max_size=2))
 def test_what_lives_and_what_is_safe_is_what_the_game_says(net: PetriNet, sources: set[int]) -> None:
     sources = {each for each in sources if each < len(net.transitions)}
@@ -133,7 +134,7 @@ def any_nets(draw: st.DrawFn) -> PetriNet:
     )
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=share_of(100), deadline=None)
 @given(any_nets(), NAMES)
 def test_any_net_comes_back_from_pnml_equal(net: PetriNet, name: str) -> None:
     document = pnml.as_pnml(net, name)

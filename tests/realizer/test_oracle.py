@@ -50,7 +50,7 @@ def test_what_can_be_scheduled_is_and_nothing_else(example: Block) -> None:
     assert (plan is not None and not (plan.dropped or plan.given_up)) == consult(example).is_possible()
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share_of(150), deadline=None)
 @given(st.one_of(possible_blocks(), possible_blocks(), random_blocks(10)))
 def test_the_schedule_is_the_earliest_there_is(example: Block) -> None:
     plan = estimated(example)

@@ -20,7 +20,7 @@ from engage_hri.services.realizer.plan.prediction import Circle
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.plan.speaking_order import SpeakingOrder
 from engage_hri.services.realizer.points import Point
-from engage_hri.services.runtime.steps import finished
+from tests.random_cases import share_of
 from tests.realizer.oracle import consult, estimate, relaxed
 
 DEPENDENTS = (
@@ -90,7 +90,7 @@ def sentences(draw: st.DrawFn, *, timed: bool) -> Block:
     return Block(id="b", behaviors=tuple(behaviors), constraints=constraints)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=share_of(200), deadline=None)
 @given(sentences(timed=False))
 def test_sentences_come_in_the_order_of_the_document_whatever_depends_on_them(block: Block) -> None:
     plan = planned(block)
@@ -100,7 +100,7 @@ def test_sentences_come_in_the_order_of_the_document_whatever_depends_on_them(bl
     assert spoken(plan) == [each.id for each in block.behaviors if isinstance(each, Speech)]
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=share_of(300), deadline=None)
 @given(sentences(timed=True))
 def test_nothing_is_dropped_that_some_order_can_serve(block: Block) -> None:
     orders = possible_orders(block)
@@ -116,7 +116,7 @@ def test_nothing_is_dropped_that_some_order_can_serve(block: Block) -> None:
         assert orders
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=share_of(200), deadline=None)
 @given(sentences(timed=True))
 def test_words_are_never_dropped_for_a_time(block: Block) -> None:
     plan = planned(block)
@@ -206,7 +206,7 @@ def circle(earlier: str, later: str) -> Circle:
 
 def passes_alone(order: SpeakingOrder) -> bool:
     at = {point: number for number, point in enumerate(ENDS)}
-    return finished(order.pass_alone(NET, at, [0.0] * len(ENDS)))
+    return order.pass_alone(NET, at, [0.0] * len(ENDS))
 
 
 def test_of_two_speeches_each_order_is_tried_and_then_one_is_lost() -> None:

@@ -17,7 +17,6 @@ from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import Equal, Term
 from engage_hri.services.realizer.plan.schedule import Solution
 from engage_hri.services.realizer.points import Point
-from engage_hri.services.runtime.steps import Steps, finished
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import GAZE, LEFT, LEFT_TOO, OTHER, SPEECH, at, plan, timed, warnings
 from tests.realizer.stage import after, block, together
@@ -157,7 +156,7 @@ def test_who_keeps_the_part_of_a_lost_one_may_be_without_its_points() -> None:
         classes.add(point)
     classes.tie(Equal((Term(Point("f", "end"), 0.0, ""), Term(Point("g", "stroke"), 0.0, ""))), "b")
 
-    losses = finished(clashes([("g", Point("f", "end")), ("h", Point("g", "stroke"))], chains, (), classes))
+    losses = clashes([("g", Point("f", "end")), ("h", Point("g", "stroke"))], chains, (), classes)
 
     assert [each.behavior for each in losses] == ["g"]
 
@@ -182,7 +181,7 @@ def test_of_nods_in_disorder_few_plans_are_made(monkeypatch: pytest.MonkeyPatch)
     plans = 0
     solve = planner.predict
 
-    def counted(*args: Any) -> Steps[Solution]:
+    def counted(*args: Any) -> Solution:
         nonlocal plans
         plans += 1
         return solve(*args)

@@ -26,7 +26,6 @@ from engage_hri.services.realizer.plan.assembly import Assembler, Assembly
 from engage_hri.services.realizer.plan.handover import Arrangement
 from engage_hri.services.realizer.plan.known import Known
 from engage_hri.services.realizer.plan.planner import plan_block
-from engage_hri.services.runtime.steps import Steps
 
 Parts = tuple[list[BlockBehavior], list[Synchronize | After]]
 
@@ -177,10 +176,10 @@ def test_random_ties_cost_few_nets(monkeypatch: pytest.MonkeyPatch) -> None:
     nets = 0
     assemble = Assembler.assemble
 
-    def counted(self: Assembler, arrangement: Arrangement) -> Steps[Assembly]:
+    def counted(self: Assembler, arrangement: Arrangement) -> Assembly:
         nonlocal nets
         nets += 1
-        return (yield from assemble(self, arrangement))
+        return assemble(self, arrangement)
 
     monkeypatch.setattr(Assembler, "assemble", counted)
     each = []

@@ -17,6 +17,7 @@ from engage_hri.services.realizer.plan.phases import chain
 from engage_hri.services.realizer.plan.planner import Plan, plan_block
 from engage_hri.services.realizer.plan.poses import planned_times, poses_before
 from engage_hri.services.realizer.points import Point
+from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import timed
 from tests.realizer.stage import after, block, together
@@ -78,7 +79,7 @@ def shape(one: Estimate) -> list[str]:
     return [each.to for each in one.phases]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share_of(150), deadline=None)
 @given(estimates(), estimates())
 def test_estimates_differ_by_their_most_different_phase_or_in_kind(
     before: list[Estimate], later: list[Estimate]
@@ -94,7 +95,7 @@ def test_estimates_differ_by_their_most_different_phase_or_in_kind(
     assert difference(before, later) == (max(natural, default=0.0), max(short, default=0.0))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share_of(150), deadline=None)
 @given(estimates(), estimates(), st.sampled_from((0.0, 0.5, 1.0)))
 def test_between_two_answers_phases_are_means_with_the_limits_of_who_can_hurry_or_dawdle_less(
     before: list[Estimate], later: list[Estimate], weight: float

@@ -6,7 +6,6 @@ import pytest
 
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place, Transition
 from engage_hri.services.realizer.plan.prediction import Impossible, predict
-from engage_hri.services.runtime.steps import finished
 
 
 def net(size: int, places: tuple[Place, ...], bounds: tuple[Bound, ...] = ()) -> PetriNet:
@@ -14,7 +13,7 @@ def net(size: int, places: tuple[Place, ...], bounds: tuple[Bound, ...] = ()) ->
 
 
 def times(made: PetriNet, known: Mapping[int, float] | None = None) -> list[float]:
-    return [round(each, 9) for each in finished(predict(made, known=known or {})).times]
+    return [round(each, 9) for each in predict(made, known=known or {}).times]
 
 
 def phase(source: int, target: int, natural: float, shortest: float, behavior: str = "a") -> Place:
@@ -111,7 +110,7 @@ def test_nothing_hurries_for_what_is_dispensable(*, is_dispensable: bool) -> Non
 
     if is_dispensable:
         with pytest.raises(Impossible) as impossible:
-            finished(predict(made, lambda ties: True))
+            predict(made, lambda ties: True)
         assert sorted(seconds for _, seconds in impossible.value.circles[0]) == [-1.5, 2.0]
     else:
-        assert list(finished(predict(made, lambda ties: False)).times) == [0.0, 1.5]
+        assert list(predict(made, lambda ties: False).times) == [0.0, 1.5]

@@ -8,9 +8,8 @@ from engage_hri.schemas.behaviors import FaceLexeme, Gesture, Wait
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.services.realizer.plan.promises import broken_by
-from engage_hri.services.realizer.plan.relations import Relations, relation_steps
+from engage_hri.services.realizer.plan.relations import Relations, relations_of
 from engage_hri.services.realizer.points import ORIGIN, Point
-from engage_hri.services.runtime.steps import finished
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
 from tests.realizer.stage import after, before, block, stage, together
@@ -21,13 +20,13 @@ A, B, C = Wait(id="a", duration=1.0), Wait(id="b", duration=1.0), Wait(id="c", d
 
 def relations(*constraints: object, elsewhere: str = "") -> Relations:
     made = block((A, B, C), *constraints)  # type: ignore[arg-type]
-    return finished(relation_steps(made, {"z": None} if elsewhere else {}))
+    return relations_of(made, {"z": None} if elsewhere else {})
 
 
 def found(said: Relations, **times: float) -> list[tuple[str, str, float]]:
     """What is broken: who is told of, the direction, and the seconds. times: `a_end` is when `a:end` comes."""
     points = {Point(*name.replace("z_", "z:").rsplit("_", 1)): at for name, at in times.items()} | {ORIGIN: 0.0}
-    return [(str(each.point), each.direction, round(each.seconds, 6)) for each in finished(broken_by(said, points))]
+    return [(str(each.point), each.direction, round(each.seconds, 6)) for each in broken_by(said, points)]
 
 
 @pytest.mark.parametrize(

@@ -35,6 +35,7 @@ from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual
+from tests.random_cases import share_of
 from tests.realizer.fake_body import HOLDS, FakeBody, Script, natural_durations, type_of
 from tests.realizer.stage import stage
 
@@ -132,7 +133,7 @@ def planned(block: Block) -> Plan | None:
         return None
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=share_of(50), deadline=None)
 @given(blocks())
 def test_an_exact_body_keeps_every_constraint_of_any_block(block: Block) -> None:
     plan = planned(block)
@@ -164,7 +165,7 @@ TARGET_AND_AWAY_AT_ONCE = Block(
 """The gaze may not stay on target, so it cannot wait there: it has to start late enough."""
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=share_of(30), deadline=None)
 @given(blocks())
 @example(TARGET_AND_AWAY_AT_ONCE)
 def test_an_exact_body_keeps_the_predicted_schedule(block: Block) -> None:
@@ -190,7 +191,7 @@ SCRIPTS = st.fixed_dictionaries(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(blocks(), SCRIPTS)
 def test_every_block_ends_exactly_once_whatever_the_body_does(block: Block, scripts: dict[str, Script]) -> None:
     seen = perform(block, FakeBody(scripts))
@@ -200,7 +201,7 @@ def test_every_block_ends_exactly_once_whatever_the_body_does(block: Block, scri
     assert seen.left == 0
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=share_of(100), deadline=None)
 @given(blocks(), st.randoms(use_true_random=False))
 def test_the_order_of_elements_does_not_change_the_net(block: Block, chance: object) -> None:
     others = list(block.behaviors)
@@ -230,7 +231,7 @@ def _types_in_order(shuffled: list[BlockBehavior], written: tuple[BlockBehavior,
     return tuple(queues[kind(each)].pop(0) for each in shuffled)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=share_of(100), deadline=None)
 @given(blocks())
 def test_every_net_is_live_and_holds_one_token_at_most(block: Block) -> None:
     plan = planned(block)
@@ -290,7 +291,7 @@ def _split(text: str, block: Block) -> tuple[str, float]:
     return f"{ref.behavior}:{ref.sync}", ref.offset
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=share_of(100), deadline=None)
 @given(blocks())
 def test_the_schedule_is_the_earliest_there_is(block: Block) -> None:
     """Where no order is put on a point that cannot wait (that waits for a measurement) and no gaze ends by itself."""

@@ -23,13 +23,14 @@ from engage_hri.services.realizer.points import FINISH, Point
 from engage_hri.services.realizer.report.outcome import completed
 from engage_hri.services.realizer.report.spoken import Spoken
 from engage_hri.services.realizer.together.live import Ending, Live
+from tests.random_cases import share_of
 from tests.realizer.planning import plan
 from tests.realizer.stage import block
 
 # -- clocks ------------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share_of(150), deadline=None)
 @given(st.randoms(use_true_random=False))
 def test_a_clock_that_was_stopped_rings_later_by_as_long_as_it_was_stopped(chance: object) -> None:
     """left: seconds to go of each clock. What is due in the same instant rings in the order of the places."""

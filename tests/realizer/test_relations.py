@@ -32,10 +32,10 @@ from engage_hri.services.realizer.plan.relations import (
     Term,
     extent,
     needing,
-    relation_steps,
+    relations_of,
 )
 from engage_hri.services.realizer.points import ORIGIN, Point
-from engage_hri.services.runtime.steps import finished
+from tests.random_cases import share_of
 
 
 class Ref(NamedTuple):
@@ -188,10 +188,10 @@ def said(draw: st.DrawFn) -> Said:
     return Said(block, Relations(tuple(equals), tuple(orders), frozenset(required), told, frozenset(unusable)))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=share_of(200), deadline=None)
 @given(said())
 def test_what_a_block_says_is_read_as_it_was_meant(case: Said) -> None:
-    found = finished(relation_steps(case.block, OTHERS))
+    found = relations_of(case.block, OTHERS)
 
     assert found.equals == case.relations.equals
     assert found.orders == case.relations.orders
@@ -214,7 +214,7 @@ def test_what_a_block_says_is_read_as_it_was_meant(case: Said) -> None:
     assert extent(case.block) == elements
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=share_of(100), deadline=None)
 @given(said())
 def test_what_needs_a_point_of_another_block_is_required_and_tied_to_it(case: Said) -> None:
     points = [Point("other:x", "stroke"), Point("dark:y", "nobody_knows")]
@@ -245,7 +245,7 @@ LIVE = "a block is known from its request until 60 s after its end; {}"
 def test_a_reference_to_nothing_refuses_the_block_with_place_and_line(ref: str, reason: str, advice: str) -> None:
     for block, where, line in naming(ref):
         with pytest.raises(BlockRefused) as refusal:
-            finished(relation_steps(block, OTHERS))
+            relations_of(block, OTHERS)
         fault = refusal.value.fault
         assert (fault.reason, fault.where, fault.line) == (reason, f"b: {where}", line)
         assert fault.advice == advice
@@ -302,7 +302,7 @@ def test_what_another_block_does_not_have_costs_the_tie_and_is_told(ref: str, re
             behaviors=tuple(replace(each, timing=()) if each.id == "w" else each for each in block.behaviors),
             constraints=tuple(replace(each, operators=each.operators[:1]) for each in block.constraints),
         )
-        found, expected = finished(relation_steps(block, OTHERS)), finished(relation_steps(without, OTHERS))
+        found, expected = relations_of(block, OTHERS), relations_of(without, OTHERS)
         told = [each for each in found.problems if each not in expected.problems]
 
         # That a wait has no end is the second thing that is told of it.
@@ -315,7 +315,7 @@ def test_what_another_block_does_not_have_costs_the_tie_and_is_told(ref: str, re
 def test_what_another_block_does_not_have_refuses_what_is_required(ref: str, reason: str, advice: str) -> None:
     for block, where, line in naming(ref, required=True):
         with pytest.raises(BlockRefused) as refusal:
-            finished(relation_steps(block, OTHERS))
+            relations_of(block, OTHERS)
 
         fault = refusal.value.fault
         assert (fault.reason, fault.where, fault.line) == (reason, f"b: {where}", line)
@@ -326,14 +326,14 @@ def test_a_reference_in_a_block_without_behaviors_says_so() -> None:
     empty = Block(id="b", behaviors=(), constraints=(Constraint(operators=(Synchronize(syncs=("x:end",)),)),))
 
     with pytest.raises(BlockRefused, match="the block has no behaviors"):
-        finished(relation_steps(empty))
+        relations_of(empty)
 
 
 def test_a_required_constraint_may_not_name_what_is_not_there() -> None:
     wrong = Constraint(operators=(After(ref="g:nowhere", syncs=("h:start",)),), id="c", required=True, line=8)
 
     with pytest.raises(BlockRefused) as refusal:
-        finished(relation_steps(Block(id="b", behaviors=BEHAVIORS, constraints=(wrong,))))
+        relations_of(Block(id="b", behaviors=BEHAVIORS, constraints=(wrong,)))
     fault = refusal.value.fault
     known = "end, ready, relax, start, stroke, stroke_end, stroke_start"
     reason = f"gaze has no sync point 'g:nowhere' (known: {known})"
@@ -360,7 +360,7 @@ def test_a_wait_that_nothing_ends_ends_at_once_with_a_warning(
     block = Block(id="b", behaviors=(BEHAVIORS[0], wait), constraints=constraints)
 
     told = Problem("PARSING_FAILURE", "line 4: wait has neither a duration nor an end; it ends at once", "w")
-    assert finished(relation_steps(block)).problems == ((told,) if is_told else ())
+    assert relations_of(block).problems == ((told,) if is_told else ())
 
 
 def test_bml_1_0_has_fewer_points_of_a_gaze_and_spells_them_otherwise() -> None:
@@ -368,7 +368,7 @@ def test_bml_1_0_has_fewer_points_of_a_gaze_and_spells_them_otherwise() -> None:
     for ref, sync in (("g:ready", "stroke"), ("g:relax", "relax"), ("g:strokeStart", None), ("g:strokeEnd", None)):
         constraint = Constraint(operators=(Synchronize(ref=ref, syncs=("w:end",)),))
         block = Block(id="b", behaviors=BEHAVIORS, constraints=(constraint,), dialect="bml-1.0")
-        found = finished(relation_steps(block))
+        found = relations_of(block)
         points = [term.point for term in found.equals[0].terms]
         assert points == [*([Point("g", sync)] if sync else []), Point("w", "end")]
         words = f"constraint 1: gaze has no sync point {ref!r} ({advice.get(ref)}); it is ignored"

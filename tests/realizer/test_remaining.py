@@ -13,7 +13,7 @@ from engage_hri.services.realizer.plan.phases import Chain, chain
 from engage_hri.services.realizer.plan.relations import Equal, Order, Relations, Term
 from engage_hri.services.realizer.plan.remaining import remaining, untied
 from engage_hri.services.realizer.points import ORIGIN, Point
-from engage_hri.services.runtime.steps import finished
+from tests.random_cases import share_of
 from tests.realizer.oracle import estimate
 
 IDS = "abcd"
@@ -46,7 +46,7 @@ def ties(draw: st.DrawFn, at: dict[Point, float]) -> list[Equal]:
     return found
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=share_of(120), deadline=None)
 @given(st.data())
 def test_what_was_tied_through_a_dropped_behavior_stays_tied(data: st.DataObject) -> None:
     at = {each: data.draw(st.sampled_from((0.0, 0.25, 1.0, 3.0))) for each in POINTS} | {ORIGIN: 0.0}
@@ -60,7 +60,7 @@ def test_what_was_tied_through_a_dropped_behavior_stays_tied(data: st.DataObject
     required = frozenset(data.draw(st.sets(st.sampled_from(IDS))))
     relations = Relations(tuple(equals), orders, required)
     chains = {id: chained(id) for id in IDS if id not in dropped}
-    present, classes = finished(remaining(relations, chains, dropped, "b"))
+    present, classes = remaining(relations, chains, dropped, "b")
 
     groups = [{each.point for each in equal.terms} for equal in equals if equal.behavior not in dropped]
     left = [each for each in POINTS if each.behavior not in dropped]
@@ -100,7 +100,7 @@ def test_what_could_not_have_been_kept_does_not_contradict_what_is_left() -> Non
     through = (Equal((Term(a, 1.0, "a+1"), Term(c, 0.0, "c"))), Equal((Term(b, 0.0, "b"), Term(c, 0.0, "c"))))
     relations = Relations((*through, same), (), frozenset())
 
-    present, classes = finished(remaining(relations, {id: chained(id) for id in "ab"}, {"c"}, "b"))
+    present, classes = remaining(relations, {id: chained(id) for id in "ab"}, {"c"}, "b")
     assert present.equals == (same,)
     assert classes.offset_between(a, b) == 0.0
 
@@ -114,7 +114,7 @@ def test_a_later_stroke_is_a_point_that_is_told_or_a_share_of_all_strokes(stroke
         tuple(Equal((each,)) for each in terms), tuple(Order(each, other) for each in terms), frozenset()
     )
 
-    present, _ = finished(remaining(relations, chains, (), "b"))
+    present, _ = remaining(relations, chains, (), "b")
     found = [each.terms[0] for each in present.equals]
     assert [each.earlier for each in present.orders] == found
     points = ("stroke", "stroke", "stroke:2", "stroke:3") if strokes else ("stroke",) * 4
@@ -123,7 +123,7 @@ def test_a_later_stroke_is_a_point_that_is_told_or_a_share_of_all_strokes(stroke
     assert [each.offset - 0.5 for each in found] == pytest.approx(shares)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=share_of(100), deadline=None)
 @given(st.data())
 def test_what_is_untied_from_other_blocks_says_nothing_of_these_points(data: st.DataObject) -> None:
     points = [Point("a", "start"), Point("b", "end"), Point("o:x", "start"), Point("o:y", "end"), Point("p:x", "end")]

@@ -17,6 +17,7 @@ from engage_hri.services.realizer.net.running import RunningNet
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
+from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.player import Player
 from tests.realizer.stage import after, block, together
@@ -92,7 +93,7 @@ def check(decisions: Decisions, now: float) -> None:
     assert decisions.net.instants == pytest.approx(fired_by(decisions.plan, decisions.began, reached, now))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(
     blocks(),
     st.sampled_from(((1.0, 1.0), (0.5, 3.0))),
@@ -116,7 +117,7 @@ def test_at_any_time_the_marking_is_the_one_that_the_reports_give(
     assert not any(net.marking)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(blocks(), st.integers(0, 10_000))
 def test_the_marking_stays_true_when_reports_lie_and_behaviors_are_dropped(made: Block, seed: int) -> None:
     """Reports at random, in any order; what is dropped, and what is held, at random, too."""

@@ -17,7 +17,7 @@ from engage_hri.services.realizer.plan.cycles import components
 from engage_hri.services.realizer.plan.numbering import numbered
 from engage_hri.services.realizer.plan.prediction import Foresight, Impossible, predict
 from engage_hri.services.realizer.plan.schedule import Lag, PositiveCycle, Solution, critical_path, solve
-from engage_hri.services.runtime.steps import finished
+from tests.random_cases import share_of
 
 QUARTERS = st.integers(-8, 8).map(lambda each: each / 4)
 Arcs = Iterable[tuple[int, int, float]]
@@ -53,7 +53,7 @@ def check_cycles(cycles: Sequence[Sequence[Lag]], known: Sequence[Lag]) -> None:
     assert all(count == 1 for count in seen.values())
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=share_of(300), deadline=None)
 @given(lags(), st.dictionaries(st.integers(1, 7), st.integers(-8, 0).map(lambda each: each / 4), max_size=2))
 def test_a_schedule_is_the_earliest_or_a_cycle_forbids_it(
     asked: tuple[int, list[Lag]], past: dict[int, float]
@@ -63,12 +63,12 @@ def test_a_schedule_is_the_earliest_or_a_cycle_forbids_it(
     expected = earliest(size, [lag[:3] for lag in given_lags], past)
     if expected is None:
         with pytest.raises(PositiveCycle) as refusal:
-            finished(solve(size, given_lags, past))
+            solve(size, given_lags, past)
         check_cycles(refusal.value.cycles, given_lags)
         assert refusal.value.lags == refusal.value.cycles[0]
         assert str(refusal.value) == f"a cycle of {sum(each.seconds for each in refusal.value.lags):+g} s"
         return
-    found = finished(solve(size, given_lags, past))
+    found = solve(size, given_lags, past)
     assert found.times == expected
     for each, at in enumerate(found.times):
         if (cause := found.causes.get(each)) is not None:
@@ -95,10 +95,10 @@ def test_every_time_of_the_clock_that_cannot_be_kept_is_found_in_one_go(
         found.append(Lag(number, 0, excess - since, len(found)))
     impossible = {n for n, (excess, at_once) in enumerate(spans, 1) if excess > 0.0 and (says_start or not at_once)}
     if not impossible:
-        finished(solve(len(spans) + 1, found))
+        solve(len(spans) + 1, found)
         return
     with pytest.raises(PositiveCycle) as refusal:
-        finished(solve(len(spans) + 1, found))
+        solve(len(spans) + 1, found)
     check_cycles(refusal.value.cycles, found)
     assert {cycle[0].target for cycle in refusal.value.cycles} == impossible
     assert all(cycle[0].source == 0 and len(cycle) == 2 for cycle in refusal.value.cycles)
@@ -107,7 +107,7 @@ def test_every_time_of_the_clock_that_cannot_be_kept_is_found_in_one_go(
 
 def test_who_could_be_later_without_a_loss_is_no_cause() -> None:
     """Of two reasons, the one that makes it later; nothing is a cause of what begins at once."""
-    found = finished(solve(3, [Lag(0, 1, 1.0, 0), Lag(0, 2, 2.0, 1), Lag(1, 2, 0.5, 2), Lag(0, 1, 0.5, 3)]))
+    found = solve(3, [Lag(0, 1, 1.0, 0), Lag(0, 2, 2.0, 1), Lag(1, 2, 0.5, 2), Lag(0, 1, 0.5, 3)])
 
     assert found == Solution([0.0, 1.0, 2.0], {1: Lag(0, 1, 1.0, 0), 2: Lag(0, 2, 2.0, 1)})
     assert critical_path(found) == (0, 2)
@@ -153,7 +153,7 @@ def arcs(net: PetriNet, *, extreme: bool) -> list[tuple[int, int, float]]:
     return [(each.source, each.target, least(each) if extreme else each.lag) for each in ties]
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=share_of(200), deadline=None)
 @given(nets(), st.dictionaries(st.integers(1, 5), st.integers(0, 12).map(lambda each: each / 4), max_size=2))
 def test_phases_give_way_only_where_they_must_and_only_as_far_as_they_can(
     net: PetriNet, known: dict[int, float]
@@ -165,7 +165,7 @@ def test_phases_give_way_only_where_they_must_and_only_as_far_as_they_can(
     easy, possible = earliest(size, natural), earliest(size, extreme)
     if possible is None:
         with pytest.raises(Impossible) as refusal:
-            finished(predict(net, known=known))
+            predict(net, known=known)
         circles = refusal.value.circles
         assert str(refusal.value) == f"a cycle of {sum(seconds for _, seconds in circles[0]):+g} s"
         for circle in circles:
@@ -178,7 +178,7 @@ def test_phases_give_way_only_where_they_must_and_only_as_far_as_they_can(
                     assert tie in (*net.places, *net.bounds)
                     assert seconds == (least(tie) if least(tie) > -1e9 else -float("inf"))
         return
-    found = finished(predict(net, known=known))
+    found = predict(net, known=known)
     if easy is not None:
         assert found.times == easy
     for source, target, seconds in extreme:
@@ -204,10 +204,10 @@ def test_every_phase_of_a_cycle_gives_way_by_a_share_of_its_room() -> None:
         (1.5, (0.0, 0.5, 0.5, 1.5)),
     ):
         net = PetriNet(transitions, places, (Bound("order", 3, 0, -total, 0.0),))
-        assert finished(predict(net)).times == pytest.approx(times)
+        assert predict(net).times == pytest.approx(times)
     net = PetriNet(transitions, places, (Bound("order", 3, 0, -1.25, 0.0),))
     with pytest.raises(Impossible, match=r"a cycle of \+0.25 s"):
-        finished(predict(net))
+        predict(net)
 
 
 def test_who_can_wait_bears_it_all_and_phases_keep_their_pace() -> None:
@@ -216,16 +216,16 @@ def test_who_can_wait_bears_it_all_and_phases_keep_their_pace() -> None:
     places = (Place("phase", 0, 1, 1.0, 0.5, "b"), Place("phase", 0, 2, 3.0, 3.0, "c"))
     bounds = (Bound("phase", 1, 0, -1.0, None, "b"), Bound("order", 2, 1, 0.0, 0.0))
 
-    assert finished(predict(PetriNet(transitions, places, bounds))).times == [0.0, 3.0, 3.0]
+    assert predict(PetriNet(transitions, places, bounds)).times == [0.0, 3.0, 3.0]
 
 
 def test_no_phase_hurries_for_what_is_dispensable() -> None:
     transitions = tuple(Transition(str(each), ()) for each in range(2))
     net = PetriNet(transitions, (Place("phase", 0, 1, 2.0, 1.0, "b"),), (Bound("order", 1, 0, -1.5, 0.0),))
 
-    assert finished(predict(net)).times == [0.0, 1.5]
+    assert predict(net).times == [0.0, 1.5]
     with pytest.raises(Impossible) as found:
-        finished(predict(net, lambda ties: {each.kind for each in ties} == {"phase", "order"}))
+        predict(net, lambda ties: {each.kind for each in ties} == {"phase", "order"})
     assert found.value.circles == (((net.places[0], 2.0), (net.bounds[0], -1.5)),) or found.value.circles == (
         ((net.bounds[0], -1.5), (net.places[0], 2.0)),
     )
@@ -237,7 +237,7 @@ def test_what_came_before_the_block_does_not_wait_for_its_start() -> None:
     start = tuple(Place("order", 0, each) for each in (1, 2))
 
     def times(known: float, *more: Place) -> list[float]:
-        return finished(predict(PetriNet(transitions, (*start, *more)), known={1: known})).times
+        return predict(PetriNet(transitions, (*start, *more)), known={1: known}).times
 
     assert times(-2.0, Place("delay", 1, 2, 3.0, 3.0)) == [0.0, -2.0, 1.0]
     assert times(-2.0, Place("delay", 1, 2, 1.0, 1.0)) == [0.0, -2.0, 0.0]
@@ -266,7 +266,7 @@ def test_components_are_who_reach_each_other(size: int, chance: Random) -> None:
         frozenset(to for to in range(size) if to in reach[each] and each in reach[to]) for each in range(size)
     }
 
-    found = finished(components(size, out))
+    found = components(size, out)
     assert all(group == sorted(group) for group in found)
     assert Counter(frozenset(group) for group in found) == Counter(expected)
     place = {each: number for number, group in enumerate(found) for each in group}
@@ -282,7 +282,7 @@ def test_transitions_are_numbered_as_they_can_fire_and_ties_in_order_without_rep
     places, bounds = list(net.places) * 2, list(net.bounds) * 2
     chance.shuffle(places)  # type: ignore[attr-defined]
     chance.shuffle(bounds)  # type: ignore[attr-defined]
-    found, former, is_ordered = finished(numbered(net.transitions, places, bounds))
+    found, former, is_ordered = numbered(net.transitions, places, bounds)
 
     waits = {(each.source, each.target) for each in places if each.kind != "idle"}
     fired: list[int] = []
@@ -299,7 +299,7 @@ def test_transitions_are_numbered_as_they_can_fire_and_ties_in_order_without_rep
     assert list(found.bounds) == sorted(set(found.bounds), key=_in_order)
     assert {_formerly(each, former) for each in found.places} == {_formerly(each, range(size)) for each in net.places}
     assert {_formerly(each, former) for each in found.bounds} == {_formerly(each, range(size)) for each in net.bounds}
-    again, _, _ = finished(numbered(net.transitions, net.places, net.bounds))
+    again, _, _ = numbered(net.transitions, net.places, net.bounds)
     assert again == found
 
 

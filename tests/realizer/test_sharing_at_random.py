@@ -183,7 +183,7 @@ def test_nobody_loses_a_part_to_another_block_in_silence(story: tuple[Sent, ...]
     run_virtual(main())
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=share_of(20), deadline=None)
 @given(streams())
 def test_blocks_share_the_simulated_body(story: tuple[Sent, ...]) -> None:
     async def main() -> None:

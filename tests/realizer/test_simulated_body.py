@@ -86,8 +86,8 @@ class Robot(Struct):
 
     def sample(self) -> None:
         now = asyncio.get_running_loop().time()
-        for run in set(self.body._torso.runs.values()):
-            joints = np.concatenate([self.body._torso.tracks[part].at(now).v for part in run.course.parts])
+        for run in set(self.body.moves.runs.values()):
+            joints = np.concatenate([self.body.moves.tracks[part].at(now).v for part in run.course.parts])
             self.speeds.setdefault(run.behavior.id, []).append((now, float(np.linalg.norm(joints))))
 
     def unnecessary_stops(self) -> list[str]:
@@ -201,13 +201,13 @@ def test_whatever_fails_the_block_ends_once_and_the_arms_are_home(
             assert len(seen.ends()) == (outcome is not None)
             assert seen.away_from_home() == {}
             assert not seen.body.state().moving
-            assert seen.body._torso.runs == {}
+            assert seen.body.moves.runs == {}
         assert asyncio.all_tasks() == {asyncio.current_task()}
 
     run_virtual(main())
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=share_of(20), deadline=None)
 @given(
     blocks(),
     st.sampled_from(

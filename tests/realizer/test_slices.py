@@ -1,10 +1,10 @@
-"""A large block is planned a slice at a time: to the same plan, while other blocks go on, until somebody cancels."""
+"""A block that needs many nets is planned a net at a time: while other blocks go on, until somebody cancels."""
 
 import asyncio
+import random
 import sys
 from collections.abc import Callable
 from types import FrameType
-from typing import TypeVar
 
 import pytest
 from hypothesis import given, settings
@@ -17,11 +17,10 @@ from engage_hri.schemas.body import SyncPointReached
 from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.services.realizer.plan.known import Known
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.planner import plan_block, plan_steps
+from engage_hri.services.realizer.plan.planner import Tries, plan_block, plan_tries
 from engage_hri.services.realizer.plan.relations import BlockRefused
-from engage_hri.services.realizer.together import planning
-from engage_hri.services.runtime.steps import Steps, finished, portions
-from engage_hri.services.runtime.unhurried import SLICE, unhurried
+from engage_hri.services.realizer.together.planning import MOST_BEHAVIORS
+from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.oracle import estimate, possible_blocks, random_blocks
 from tests.realizer.stage import Stage, block, stage, together
@@ -37,23 +36,22 @@ from tests.realizer.test_plan_growth import (
     references,
     rivals,
     series,
+    tied_at_random,
 )
 
-T = TypeVar("T")
-
 SHAPES = [references, looks, series, measured_words, joined, fixed, hopeless, hasty, rivals, preparing]
-MOST_CALLS = 25_000
-"""In one slice, for 800 behaviors: five milliseconds or so."""
+MOST_CALLS = 250_000
+"""In one try, for as many behaviors as a block may have: fifty milliseconds or so."""
 
 
-def large(shape: Callable[[int], Parts], size: int = 400, id: str = "large") -> Block:
+def large(shape: Callable[[int], Parts], size: int = MOST_BEHAVIORS, id: str = "large") -> Block:
     behaviors, operators = shape(size)
     return Block(id=id, behaviors=tuple(behaviors), constraints=(Constraint(operators=tuple(operators)),))
 
 
-def slices(steps: Steps[T]) -> tuple[list[int], T]:
-    """Functions called in each slice, as the event loop would see it; and what comes of all."""
-    calls, done = [0], 0
+def tries(steps: Tries[Plan]) -> tuple[list[int], Plan]:
+    """Functions called in each try, as the event loop would see it; and the plan."""
+    calls = [0]
 
     def counted(frame: FrameType, event: str, argument: object) -> None:
         calls[-1] += event in ("call", "c_call")
@@ -62,39 +60,37 @@ def slices(steps: Steps[T]) -> tuple[list[int], T]:
     sys.setprofile(counted)
     try:
         while True:
-            done += next(steps)
-            if done >= SLICE:
-                done = 0
-                calls.append(0)
+            next(steps)
+            calls.append(0)
     except StopIteration as end:
         return calls, end.value
     finally:
         sys.setprofile(before)
 
 
-def tried(steps: Steps[Plan]) -> Plan | str:
+def tried(steps: Tries[Plan]) -> Plan | str:
     try:
-        return finished(steps)
+        return tries(steps)[1]
     except BlockRefused as error:
         return str(error)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_no_slice_of_planning_is_long(shape: Callable[[int], Parts]) -> None:
-    said = tuple(Speech(id=f"s{number}", text="one") for number in range(400))
+def test_no_try_is_long(shape: Callable[[int], Parts]) -> None:
+    said = tuple(Speech(id=f"s{number}", text="one") for number in range(MOST_BEHAVIORS))
     elsewhere = {"other": Block(id="other", behaviors=said)}
 
-    calls, plan = slices(plan_steps(large(shape), known=Known(blocks=elsewhere)))
+    calls, plan = tries(plan_tries(large(shape), known=Known(blocks=elsewhere)))
     assert max(calls) < MOST_CALLS
     assert plan == plan_block(large(shape), known=Known(blocks=elsewhere))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(st.lists(random_blocks(12) | possible_blocks(12), min_size=2, max_size=3), st.randoms(use_true_random=False))
 def test_blocks_that_are_planned_in_turns_get_the_plans_they_get_alone(blocks: list[Block], chance) -> None:  # type: ignore[no-untyped-def]
-    alone = [tried(plan_steps(each, [estimate(one) for one in each.behaviors])) for each in blocks]
+    alone = [tried(plan_tries(each, [estimate(one) for one in each.behaviors])) for each in blocks]
     going = {
-        number: plan_steps(each, [estimate(one) for one in each.behaviors]) for number, each in enumerate(blocks)
+        number: plan_tries(each, [estimate(one) for one in each.behaviors]) for number, each in enumerate(blocks)
     }
     found: dict[int, Plan | str] = {}
     while going:
@@ -109,32 +105,6 @@ def test_blocks_that_are_planned_in_turns_get_the_plans_they_get_alone(blocks: l
             del going[number]
 
     assert [found[number] for number in range(len(blocks))] == alone
-
-
-def test_portions_are_all_there_is_in_order() -> None:
-    assert [list(each) for each in portions(range(5), 2)] == [[0, 1], [2, 3], [4]]
-    assert list(portions({}.values())) == []
-
-
-async def test_work_with_pauses_lets_others_run_and_returns_what_it_is_for() -> None:
-    turns = []
-
-    def work() -> Steps[str]:
-        for _ in range(8):
-            yield SLICE // 2
-        return "done"
-
-    async def others() -> None:
-        while True:
-            turns.append(None)
-            await asyncio.sleep(0)
-
-    other = asyncio.create_task(others())
-    assert await unhurried(work()) == "done"
-    other.cancel()
-    await asyncio.gather(other, return_exceptions=True)
-
-    assert len(turns) == 4
 
 
 TIED = block(
@@ -155,19 +125,18 @@ async def turns(until: Callable[[], bool], most: int = 10_000) -> int:
     raise AssertionError("never")
 
 
-@pytest.fixture
-def any_size(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Blocks of any size are planned."""
-    monkeypatch.setattr(planning, "MOST_BEHAVIORS", 5000)
-    monkeypatch.setattr(planning, "MOST", 5000)
+def many_nets() -> Block:
+    """A block that needs many nets."""
+    made = tied_at_random(100, random.Random(3))
+    return Block(id="large", behaviors=made.behaviors, constraints=made.constraints)
 
 
-async def test_a_sync_point_is_answered_while_another_block_is_planned(any_size: None) -> None:
+async def test_a_sync_point_is_answered_while_another_block_is_planned() -> None:
     body = FakeBody({"one": Script(stall="end")})
     async with stage(body) as seen:
         small = seen.ask(TIED)
         await seen.seen("one:start", "small")
-        seen.ask(large(references))
+        seen.ask(many_nets())
         await turns(lambda: body.asked > 1)
         for _ in range(20):  # well into it
             await asyncio.sleep(0)
@@ -182,10 +151,10 @@ async def test_a_sync_point_is_answered_while_another_block_is_planned(any_size:
         seen.requests.cancel("r-large")
 
 
-async def test_a_block_that_is_cancelled_while_it_is_planned_ends_at_once(any_size: None) -> None:
+async def test_a_block_that_is_cancelled_while_it_is_planned_ends_at_once() -> None:
     body = FakeBody()
     async with stage(body) as seen:
-        pending = seen.ask(large(references))
+        pending = seen.ask(many_nets())
         await turns(lambda: body.asked > 0)
         for _ in range(20):
             await asyncio.sleep(0)
@@ -204,18 +173,7 @@ def test_what_comes_with_the_successor_is_not_cut_short_by_it() -> None:
     """Planning settles at once: the way home, which begins in that very instant, is all that is given up."""
     behaviors = (Gaze(id="g", target="a"), Gaze(id="h", target="b"))
     made = block(behaviors, together("g:relax", "h:start"), together("g:start", "0"), together("h:start", "2"))
-    calls = 0
 
-    def limited() -> Steps[Plan]:
-        nonlocal calls
-        steps = plan_steps(made, [FakeBody().estimate(each) for each in behaviors])
-        while calls < 1000:
-            calls += 1
-            try:
-                yield next(steps)
-            except StopIteration as end:
-                return end.value
-        raise AssertionError("it does not settle")
-
-    plan = finished(limited())
+    calls, plan = tries(plan_tries(made, [FakeBody().estimate(each) for each in behaviors]))
+    assert len(calls) < 10
     assert [plan.predicted(point) for point in plan.chains["g"].points] == [0.0, 0.0, 0.0, 0.5, 2.0, 2.0, 2.0]

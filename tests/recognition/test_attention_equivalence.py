@@ -11,6 +11,7 @@ from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome
 from engage_hri.schemas.requests import Accepted
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.recognizer import Recognizer
+from tests.random_cases import share_of
 from tests.recognition.observations import HUMAN, ROBOT, request_event, stamp
 from tests.recognition.raw import PLACES, TABLE, face, hand, piece, pose, table, voice
 
@@ -102,7 +103,7 @@ def when(moment: object) -> float:
     return round(moment.seconds, 3)  # type: ignore[attr-defined, no-any-return]
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=share_of(10), deadline=None)
 @given(st.integers(0, 10**6))
 @example(0)
 def test_a_filmed_scene_gives_the_same_events_as_a_told_one(seed):

@@ -16,6 +16,7 @@ from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.session import Session
+from tests.random_cases import share_of
 from tests.recognition.observations import ROBOT, request_event, stamp, world
 from tests.recognition.test_random_streams import Chance, Stream
 
@@ -145,7 +146,7 @@ def close(one: float | None, other: float) -> bool:
     return one is not None and abs(one - other) < 1e-9
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(seeds)
 def test_the_delay_of_a_gaze_is_from_the_initiators_start_to_the_responders(seeded):
     raw = Raw(seeded.stream)
@@ -255,7 +256,7 @@ further = words.map(lambda drawn: _one_after_the_other(drawn, odd=0.0191))
 rounds = st.builds(Round, st.booleans(), st.integers(5, 40).map(lambda tenths: 0.1 * tenths), acts, further)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share_of(150), deadline=None)
 @given(st.lists(rounds, min_size=1, max_size=4))
 def test_the_delay_of_an_answer_is_from_the_end_of_the_turn(rounds):
     stream = [seen for number, one in enumerate(rounds) for seen in one.stream(f"turn-{number}", 30.0 * number + 1.0)]
@@ -277,7 +278,7 @@ def test_the_delay_of_an_answer_is_from_the_end_of_the_turn(rounds):
             assert life.completed is not None
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share_of(150), deadline=None)
 @given(rounds, st.lists(st.tuples(st.booleans(), st.integers(5, 150), st.integers(2, 15)), max_size=4))
 def test_the_first_answer_after_the_limit_is_late_unless_the_robot_has_spoken_since(one, after):
     """after: further words of robot or person, each some tenths of a second after the last, and how long."""

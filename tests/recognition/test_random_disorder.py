@@ -16,6 +16,7 @@ from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events import conversation, person, presence, session
 from engage_hri.services.recognition.events.machine import Effect
 from engage_hri.services.recognition.events.session import Observation, Session
+from tests.random_cases import share_of
 from tests.recognition.observations import ROBOT, world
 from tests.recognition.test_random_streams import Chance, Stream, streams
 
@@ -49,7 +50,7 @@ def by_content(effects: list[Effect]) -> Counter[ConnectionEvent]:
     return Counter(replace(effect, id="") for effect in effects if isinstance(effect, ConnectionEvent))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(streams, st.integers(0, 99))
 def test_what_comes_twice_changes_nothing(stream, seed):
     """Actions and presence also after others have come; what travels by itself on its key, at once."""
@@ -113,7 +114,7 @@ def concerns(observation: Observation) -> str:
     return ""
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share_of(60), deadline=None)
 @given(independent())
 def test_what_different_persons_do_may_come_in_any_order_unless_a_limit_passes_between(streams):
     one, other = streams

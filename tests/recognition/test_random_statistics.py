@@ -12,6 +12,7 @@ from engage_hri.services.recognition.events.machine import Effect
 from engage_hri.services.recognition.events.session import Session
 from engage_hri.services.recognition.statistics.engagement import JUST_AFTER, next_level
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
+from tests.random_cases import share_of
 from tests.recognition import recomputed
 from tests.recognition.observations import ROBOT, world
 from tests.recognition.test_random_streams import ACTORS, Stream, streams
@@ -60,7 +61,7 @@ class Replay:
         return told
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=share_of(15), deadline=None)
 @given(streams)
 def test_what_was_published_last_is_true_of_the_log_at_every_moment(stream):
     replay = Replay()
@@ -104,7 +105,7 @@ class Judge:
         return self.level if value is None or self._busy else next_level(self.level, value, CONFIG)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=share_of(25), deadline=None)
 @given(streams)
 def test_the_estimate_follows_its_definition_and_no_level_changes_in_silence(stream):
     replay = Replay()

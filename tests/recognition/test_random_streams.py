@@ -187,7 +187,7 @@ def test_every_event_ends_exactly_once_and_every_request_is_answered(stream, res
     assert session.deadline is None
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=share_of(100), deadline=None)
 @given(any_streams)
 def test_times_of_an_event_never_run_backwards(stream):
     _, effects, _, _ = run(stream)

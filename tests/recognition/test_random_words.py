@@ -21,6 +21,7 @@ from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events import session
 from engage_hri.services.recognition.perceive.words import WORDS_MARGIN, TimedWords
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer
+from tests.random_cases import share_of
 from tests.recognition.observations import ROBOT, stamp, world
 
 PEOPLE = ("ann", "bob", "carl")
@@ -232,7 +233,7 @@ def only_spoken(story: Talk) -> Talk:
     return story._replace(messages=tuple(each for each in story.messages if each.id in kept))
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=share_of(80), deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_each_event_ends_up_with_the_words_of_its_speech(seed: int) -> None:
     story = only_spoken(talk(random.Random(seed)))
@@ -243,7 +244,7 @@ def test_each_event_ends_up_with_the_words_of_its_speech(seed: int) -> None:
         assert life[-1].words == expected_words(life, said, events), life[-1]
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=share_of(80), deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_words_change_nothing_but_words(seed: int) -> None:
     """But for those that are said into a turn of the robot to this person."""
@@ -273,7 +274,7 @@ def tells_only_words(before: ConnectionEvent, after: ConnectionEvent) -> bool:
     return after.retold and same and after.words != before.words
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=share_of(80), deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_words_alone_are_told_with_the_speech_that_they_are(seed: int) -> None:
     """Here all of it counts: lines that were typed, and words whose speech was missed."""

@@ -1,8 +1,8 @@
 """The anchor scenario, recorded once for all tests that only read it."""
 
 import asyncio
-from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -14,28 +14,36 @@ from engage_hri.services.control.testing.plugin import virtual_loop
 from engage_hri.services.recording.disk import read
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.tangram.people.config import SimulationConfig
+from tests import plays
 from tests.recording.runs import tangram
 
+Told = list[tuple[Message, Seconds]]
 
-class Anchor:
+
+class Anchor(NamedTuple):
     """A recorded run. live: what a subscription got meanwhile. told: what a console followed, with the instants."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.told: list[tuple[Message, Seconds]] = []
-        config = Config(simulation=SimulationConfig(human="appendix-b"))
-        note: Callable[[Message, Seconds], None] = lambda message, at: self.told.append((message, at))  # noqa: E731
-        with asyncio.Runner(loop_factory=virtual_loop) as runner:
-            self.live: list[Received] = runner.run(tangram(path, config, note))
+    path: Path
+    live: list[Received]
+    told: Told
 
     @property
     def recording(self) -> Recording:
         return read(self.path)
 
 
+def _anchor(folder: Path) -> tuple[list[Received], Told]:
+    told: Told = []
+    config = Config(simulation=SimulationConfig(human="appendix-b"))
+    with asyncio.Runner(loop_factory=virtual_loop) as runner:
+        live = runner.run(tangram(folder / "a.mcap", config, lambda message, at: told.append((message, at))))
+    return live, told
+
+
 @pytest.fixture(scope="session")
 def anchor(tmp_path_factory: pytest.TempPathFactory) -> Anchor:
-    return Anchor(tmp_path_factory.mktemp("anchor") / "a.mcap")
+    folder, (live, told) = plays.once(tmp_path_factory, "anchor", _anchor)
+    return Anchor(folder / "a.mcap", live, told)
 
 
 @pytest.fixture

@@ -1,8 +1,11 @@
 """Recordings made in tests: of samples, and of whole runs in memory and virtual time."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from zlib import crc32
+
+from mcap.opcode import Opcode
+from mcap.writer import MCAP0_MAGIC
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.messages import Message, encode, encoding_of, published
@@ -24,8 +27,8 @@ def sample(
 
 def line(one: Sample, form: StoredForm) -> Line:
     return Line(
-        topic=f"robot/{one.key}", form=form.encoding, is_typed=form.is_typed, key=one.key, sender=one.source,
-        life=one.life, clock=one.clock, encoding=one.encoding, is_past=one.past,
+        topic=f"robot/{one.key}", form=form.encoding, typed=form.is_typed, key=one.key, sender=one.source,
+        life=one.life, clock=one.clock, encoding=one.encoding, past=one.past,
     )  # fmt: skip
 
 
@@ -49,6 +52,20 @@ def bytes_of(samples: Sequence[Sample], chunk: int = 7, *, is_whole: bool = True
         return data
     data += writer.told("end", {"messages": str(len(samples)), "lost": "0"}, len(data))
     return data + b"".join(writer.finish(len(data), crc32(data)))
+
+
+def chunks_of(data: bytes) -> list[tuple[int, int]]:
+    """Begin and end of each chunk in a whole file that has messages: the first chunk of a file has none."""
+    return [(begin, end) for begin, end in records(data) if data[begin] == Opcode.CHUNK][1:]
+
+
+def records(data: bytes) -> Iterator[tuple[int, int]]:
+    """Begin and end of each record of an undamaged file."""
+    at = len(MCAP0_MAGIC)
+    while at < len(data) - len(MCAP0_MAGIC):
+        end = at + 9 + int.from_bytes(data[at + 1 : at + 9], "little")
+        yield at, end
+        at = end
 
 
 def recording(samples: Sequence[Sample], chunk: int = 7) -> Recording:

@@ -52,9 +52,9 @@ async def test_what_a_killed_recorder_took_before_its_last_write_is_in_the_file(
     assert numbers == [*range(len(numbers))]
     assert numbers
     assert mine[-1].at - mine[0].at >= FLUSH
-    repair(path)
-    assert read(path).is_whole
-    assert len(read(path)) == len(recording)
+    repair(recording, tmp_path / "b.mcap", print)
+    assert read(tmp_path / "b.mcap").is_whole
+    assert len(read(tmp_path / "b.mcap")) == len(recording)
 
 
 async def _soon(loop: asyncio.AbstractEventLoop) -> None:

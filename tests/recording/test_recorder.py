@@ -22,7 +22,7 @@ from engage_hri.services.recording.disk import RecordingFile, read
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.service import FLUSH
 from tests.recording.conftest import Anchor
-from tests.recording.files import all_of
+from tests.recording.files import FACTS, all_of
 from tests.recording.runs import recording_to
 
 
@@ -200,7 +200,7 @@ def test_a_file_that_could_not_be_begun_is_not_left_behind(tmp_path: Path, monke
 
     monkeypatch.setattr(os, "write", full)
     with pytest.raises(InputRefused, match="No space left on device"):
-        RecordingFile(tmp_path / "a.mcap", {}, print)
+        RecordingFile(tmp_path / "a.mcap", FACTS, print)
 
     assert not list(tmp_path.iterdir())
 

@@ -5,7 +5,6 @@ import io
 from itertools import accumulate, pairwise
 from pathlib import Path
 
-import praatio.textgrid
 import pympi
 import pytest
 from hypothesis import example, given
@@ -18,7 +17,7 @@ from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Sample
-from engage_hri.services.recording.annotations import Media, eaf, table, textgrid
+from engage_hri.services.recording.annotations import Media, eaf, table
 from engage_hri.services.recording.lanes import Annotation, Tier, apart
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.tiers import tiers
@@ -97,20 +96,6 @@ def test_an_eaf_is_read_by_another_library_as_it_was_meant(task: Recording, tmp_
     assert document.get_linked_files()[0]["MEDIA_URL"] == "file:///films/a.mp4"
 
 
-def test_a_textgrid_is_read_by_another_library_as_it_was_meant(task: Recording, tmp_path: Path) -> None:
-    made = tiers(task)
-    (tmp_path / "a.TextGrid").write_text(textgrid(made, task.duration), encoding="utf-8")
-
-    grid = praatio.textgrid.openTextgrid(str(tmp_path / "a.TextGrid"), includeEmptyIntervals=False)
-
-    assert list(grid.tierNames) == [tier.name for tier in made]
-    for tier in made:
-        found = grid.getTier(tier.name).entries
-        assert [one.label for one in found] == [one.value for one in tier.annotations]
-        assert [one.start for one in found] == pytest.approx([one.begin for one in tier.annotations], abs=2e-6)
-        assert [one.end for one in found] == pytest.approx([one.end for one in tier.annotations], abs=2e-6)
-
-
 def test_a_table_has_a_row_for_each_annotation(task: Recording) -> None:
     made = tiers(task)
 
@@ -169,7 +154,6 @@ def test_any_text_and_any_times_are_valid_files(given: list[Annotation], text: s
 
     root = etree.fromstring(eaf(made, date=DATE))
     assert len(root.findall(".//ANNOTATION")) == len(given)
-    assert textgrid(made, 1.0).count("text = ") >= len(given)
 
 
 def test_what_began_before_and_what_never_ended_are_cut_to_the_recording() -> None:

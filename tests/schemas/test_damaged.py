@@ -92,7 +92,7 @@ def test_a_damaged_document_is_read_or_refused(reader: str, data: st.DataObject)
         read(data.draw(damaged(good)))
 
 
-@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=share_of(200), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @pytest.mark.parametrize(("read", "good"), [(load, TOML), (load_world, EXAMPLE.encode())])
 @given(data=st.data())
 def test_a_damaged_file_is_read_or_refused(

@@ -18,6 +18,7 @@ from engage_hri.schemas.feedback import (
     WarningKind,
 )
 from engage_hri.schemas.units import Stamp
+from tests.random_cases import share_of
 from tests.schemas.feedback_reader import decode_feedback
 from tests.schemas.strategies import ids
 
@@ -99,7 +100,7 @@ messages = st.one_of(
 )  # fmt: skip
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=share_of(200), deadline=None)
 @given(messages)
 def test_feedback_survives_xml(message: Feedback) -> None:
     assert decode_feedback(encode_feedback(message)) == (message,)

@@ -5,6 +5,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from engage_hri.schemas.speakable import has_words, joined, tokens, word_count
+from tests.random_cases import share_of
 
 MIXED = st.text(
     st.sampled_from(list("aZé 3.,!(—😊\n世界。，「」ー。かキャぁ한ข้เไมำ‍ြက္กភ្ាា")) | st.characters(), max_size=40
@@ -30,7 +31,7 @@ def test_words_are_divided_by_spaces_and_other_scripts_by_characters(text: str, 
     assert [token.text for token in tokens(text)] == expected
 
 
-@settings(max_examples=300)
+@settings(max_examples=share_of(300))
 @given(MIXED)
 @example("「「 ((")
 def test_nothing_but_white_space_is_left_out(text: str) -> None:

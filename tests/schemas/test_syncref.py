@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas.behavior_types import canonical_sync, dialect_sync
 from engage_hri.schemas.syncref import SyncRef
+from tests.random_cases import share_of
 
 names = st.from_regex(r"[A-Za-z_][A-Za-z0-9_.-]{0,8}", fullmatch=True)
 ids = names.filter(lambda name: name != "bml")
@@ -76,7 +77,7 @@ def test_a_known_mark_is_not_taken_for_an_offset() -> None:
     assert SyncRef.parse("s:word-2-1", names={"word-2"}) == SyncRef(behavior="s", sync="word-2", offset=-1)
 
 
-@settings(max_examples=200)
+@settings(max_examples=share_of(200))
 @given(references())
 def test_the_canonical_text_of_a_reference_reads_back_equal(reference: SyncRef) -> None:
     assert SyncRef.parse(str(reference)) == reference

@@ -26,6 +26,7 @@ from engage_hri.schemas.tool import (
 )
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig
+from tests.random_cases import share_of
 
 SCENE = World(
     entities=(
@@ -103,7 +104,7 @@ FORMATS: tuple[Format, ...] = ("anthropic", "openai", "openai-chat")
 EVERY = [schema(format, world) for format, world in product(FORMATS, (None, SCENE))]
 
 
-@settings(max_examples=150)
+@settings(max_examples=share_of(150))
 @given(st.sampled_from(EVERY).flatmap(instances))
 def test_whatever_the_schema_allows_decodes(call: Any) -> None:
     fragment = decoded(call)

@@ -14,6 +14,7 @@ from engage_hri.schemas.documents.json_codec import read
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.documents.xml_notes import MOST
 from engage_hri.schemas.faults import InputRefused
+from tests.random_cases import share_of
 from tests.schemas.test_xml_codec import BML_1_0, DRAFT, FRAGMENT, block, refused
 
 LAUGHS = (
@@ -104,7 +105,7 @@ def test_hostile_input_is_refused_at_once(hostile: bytes | str) -> None:
     assert time.process_time() - began < 2.0
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=share_of(300), deadline=None)
 @given(
     st.binary(max_size=200) | st.text(max_size=200).map(lambda text: text.encode(errors="surrogatepass")),
     st.booleans(),
@@ -127,7 +128,7 @@ def mutated(draw: st.DrawFn) -> bytes:
     return text
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=share_of(300), deadline=None)
 @given(mutated())
 def test_no_other_exception_ever_leaves_the_decoder(data: bytes) -> None:
     with suppress(InputRefused):

@@ -36,7 +36,7 @@ def bits(text: str, random: Random) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("seed", range(-(-share_of(10_000) // 50)))
+@pytest.mark.parametrize("seed", range(-(-share_of(10_000, 20) // 50)))
 def test_letters_are_those_of_a_parser_of_commonmark_in_whatever_bits_a_text_comes(seed: int) -> None:
     for number in range(seed * 50, seed * 50 + 50):
         random = Random(number)
@@ -47,7 +47,7 @@ def test_letters_are_those_of_a_parser_of_commonmark_in_whatever_bits_a_text_com
         assert tuple(each.text for each in pieces if each.kind == "refer") == mixture.named, (number, mixture.text)
 
 
-@pytest.mark.parametrize("seed", range(-(-share_of(10_000) // 50)))
+@pytest.mark.parametrize("seed", range(-(-share_of(10_000, 20) // 50)))
 def test_the_words_that_a_voice_says_are_those_of_a_parser_of_commonmark(seed: int) -> None:
     for number in range(seed * 50, seed * 50 + 50):
         mixture = Maker(Random(number), with_references=False).mixture()
@@ -246,7 +246,7 @@ def plain_pieces(pieces: Iterable[Piece]) -> list[tuple[object, ...]]:
     return found
 
 
-@pytest.mark.parametrize("seed", range(-(-share_of(10_000) // 50)))
+@pytest.mark.parametrize("seed", range(-(-share_of(10_000, 20) // 50)))
 def test_any_text_is_read_and_the_bits_do_not_matter(seed: int) -> None:
     for number in range(seed * 50, seed * 50 + 50):
         random, ids = Random(number), Ids(("a", "b]"))
@@ -259,7 +259,7 @@ def test_any_text_is_read_and_the_bits_do_not_matter(seed: int) -> None:
         )
 
 
-@pytest.mark.parametrize("seed", range(-(-share_of(10_000) // 50)))
+@pytest.mark.parametrize("seed", range(-(-share_of(10_000, 20) // 50)))
 def test_of_a_stream_is_said_what_is_said_of_the_whole_text(seed: int) -> None:
     for number in range(seed * 50, seed * 50 + 50):
         random, ids, chunker = Random(number), Ids(()), Chunker()

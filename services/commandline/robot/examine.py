@@ -6,13 +6,12 @@ Each question has a bound, and who is silent is not asked again.
 import asyncio
 import os
 import platform
-import re
 import socket
 import ssl
 import time
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, suppress
-from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
 
@@ -36,7 +35,6 @@ from engage_hri.services.doctor.facts import (
     BodyFacts,
     Certificate,
     EndpointFacts,
-    Package,
     ParticipantFacts,
     SystemFacts,
     WorldFacts,
@@ -59,7 +57,6 @@ TELLS: Seconds = 0.3
 TRIPS = 5
 HOLDER = "viewer"
 """Whose keys are taken, where the folder of keys is that of several."""
-_NEEDED = re.compile(r"([A-Za-z0-9._-]+)(?:\[[^\]]*\])?\s*([^;]*)(;.*)?")
 
 
 @asynccontextmanager
@@ -92,7 +89,7 @@ async def _outside(bus: BusConfig) -> tuple[SystemFacts, Keys | None]:
     doors = tuple(await asyncio.gather(*(_knock(endpoint, own) for endpoint in endpoints)))
     facts = SystemFacts(
         robot=bus.robot, at=time.time(), version=installed_version(), protocol=keys.PREFIX, own=_itself(),
-        services=keys.SERVICES, packages=tuple(_packages()), doors=doors, bus=False, problem=problem,
+        services=keys.SERVICES, doors=doors, bus=False, problem=problem,
         certificates=tuple(_certificates(bus)),
     )  # fmt: skip
     return facts, own
@@ -100,7 +97,7 @@ async def _outside(bus: BusConfig) -> tuple[SystemFacts, Keys | None]:
 
 def _itself() -> ProcessFacts:
     """Tell what this process runs on, without a bus."""
-    zenoh = _version("eclipse-zenoh")
+    zenoh = version("eclipse-zenoh")
     return ProcessFacts(host=platform.node(), python=platform.python_version(), wall=time.time(), zenoh=zenoh)
 
 
@@ -210,24 +207,6 @@ async def _sight(bus: Bus) -> WorldFacts | Literal["unknown"] | None:
 
 
 # -- this machine ---------------------------------------------------------------------------------------------------
-
-
-def _packages() -> Iterator[Package]:
-    """Packages that Engage cannot do without, as its own package names them."""
-    try:
-        needed = requires("engage-hri") or []
-    except PackageNotFoundError:  # run from its sources
-        return
-    for line in needed:
-        if (match := _NEEDED.fullmatch(line.strip())) is not None and "extra" not in (match[3] or ""):
-            yield Package(name=match[1], wanted=match[2].strip(), version=_version(match[1]))
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return ""
 
 
 def _keys(bus: BusConfig) -> tuple[Keys | None, Fault | None]:

@@ -34,9 +34,7 @@ def opened(path: Path) -> "Recording":
     from engage_hri.services.recording.disk import read
 
     recording = read(path)
-    if (there := recording.another) is not None:
-        complain(f"{path}: another recording begins at byte {there}, and is not read")
-    elif not recording.is_whole and recording.has_all_data:
+    if recording.has_all_data and not recording.is_whole:
         whole = f"its data is there, {len(recording)} messages"
         complain(f"{path}: the index at its end is damaged, or more stands behind it; {whole}")
     if not recording.has_all_data:
@@ -46,7 +44,7 @@ def opened(path: Path) -> "Recording":
             f" are whole{behind}"
         )
     if recording.repaired:
-        complain(f"{path}: it was repaired before, and then: {recording.repaired}")
+        complain(f"{path}: it is a copy of a recording that lacked something: {recording.repaired}")
     for place in recording.damaged:
         complain(f"{path}: damaged at byte {place.offset}: {place.reason}")
     if recording.losses.total:
@@ -86,4 +84,6 @@ def _report(recorder: "Recorder", file: "RecordingFile", is_whole: bool) -> None
     if lost.total:
         complain(f"{file.path}: {lost.total} messages are missing, {lost.disk} of them for want of room on the disk")
     if not is_whole:
-        complain(f"{file.path}: it has no end; `engage record --repair` gives it one once there is room")
+        complain(
+            f"{file.path}: it has no end; `engage record --repair` makes a copy that has one, once there is room"
+        )

@@ -21,6 +21,9 @@ from engage_hri.services.bus.samples import Received
 from engage_hri.services.commandline.shell.process import DONE
 from engage_hri.services.commandline.shell.recording_file import opened
 from engage_hri.services.commandline.shell.settings import RobotConfig
+from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.control.serving.intake import ControlIntake
+from engage_hri.services.control.serving.steps import ControlStep
 from engage_hri.services.recognition import intake as recognition
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recording.reading import Recording
@@ -47,7 +50,12 @@ class PlayedService(NamedTuple):
     content: Any
 
 
-SERVICES = {"recognition": PlayedService(RecognitionConfig, recognition.Intake, recognition.Content)}
+SERVICES = {
+    "control": PlayedService(
+        ControlConfig, lambda robot, config, clock, session: ControlIntake(robot, config, clock.name), ControlStep
+    ),
+    "recognition": PlayedService(RecognitionConfig, recognition.Intake, recognition.Content),
+}
 
 
 class Compared(Struct, frozen=True, kw_only=True):

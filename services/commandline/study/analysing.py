@@ -150,12 +150,10 @@ def _doubts(recording: Recording, told: Sequence[Told], times: RecordingTimes) -
             is_here = known.setdefault(event.id, not past and _began(event, times, recording, 0.0, inf))
             lives |= {event.session} if is_here else set()
     before = sum(not counts for counts in known.values())
-    if recording.another is not None:
-        yield "another recording begins behind it in the file, and is not counted"
     if not recording.has_all_data:
         yield f"its end is missing or damaged: the numbers are of the first {recording.duration:.0f} s"
     if recording.repaired:
-        yield f"it was repaired before, and then: {recording.repaired}"
+        yield f"it is a copy of a recording that lacked something: {recording.repaired}"
     if recording.losses.total:
         yield f"{recording.losses.total} messages are missing"
     if recording.losses.still:

@@ -41,7 +41,7 @@ class Options(Connected):
     ] = None
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file if there is one.")] = False
     repair: Annotated[
-        bool, typer.Option("--repair", help="Give FILE the end that it lacks, or a new one for a damaged one.")
+        bool, typer.Option("--repair", help="Copy all that can be read of a damaged FILE into a whole one beside it.")
     ] = False
 
 
@@ -60,15 +60,16 @@ def _repair(path: Path | None) -> int:
 
     if path is None:
         raise InputRefused(Fault(reason="needs a FILE", where="--repair"))
-    before = read(path)
-    cut = repair(path)
-    done = "nothing to repair" if before.is_whole else f"{len(before)} messages, and a new index"
-    if cut:
-        done += f"; {cut} bytes at the end were not whole and are cut off"
-    if before.damaged:
-        done += "; what is damaged before its end cannot be brought back, and all commands leave it out"
-    print(f"{path}: {done}")
-    return DONE
+    recording = read(path)
+    if recording.is_whole and not recording.damaged:
+        print(f"{path}: nothing to repair")
+        return DONE
+    copy = path.with_suffix(".repaired.mcap")
+    is_whole = repair(recording, copy, complain)
+    print(f"{copy}: {len(recording)} messages")
+    for lack in recording.lacks:
+        print(f"{copy}: {lack}")
+    return DONE if is_whole else FAILED
 
 
 async def _record(options: Options, config: RobotConfig, path: Path) -> int:

@@ -5,7 +5,6 @@ bus, and ends with its parent.
 """
 
 import asyncio
-import random
 import sys
 import traceback
 from dataclasses import dataclass
@@ -13,26 +12,18 @@ from dataclasses import dataclass
 import msgspec
 from msgspec import Struct
 
-from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
-from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.embedding import play_tangram
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.process import DONE
-from engage_hri.services.recognition.events.session import Session
-from engage_hri.services.recognition.statistics.tally import EventTally
 from engage_hri.services.runtime.virtual_time import run_virtual
 from engage_hri.services.study.records import EventRecord, SessionRecord, SessionRecorder
-from engage_hri.services.tangram.people import human_session
-
-A_WHILE: Seconds = 120.0
-"""Time after the last drawn event by which all open events have ended."""
 
 
 class Order(Struct, frozen=True, kw_only=True):
     """Order to play one session.
 
     limit: time after which it is broken off, in virtual time.
-    people: no robot, but two people drawn from Table 2.1; only the configuration of recognition counts.
     """
 
     session: int
@@ -40,7 +31,6 @@ class Order(Struct, frozen=True, kw_only=True):
     seed: int
     limit: Seconds
     config: Config
-    people: bool = False
 
 
 class SessionResult(Struct, frozen=True, kw_only=True):
@@ -70,10 +60,7 @@ def play(order: Order) -> SessionResult:
     recording = SessionRecorder(order.config.robot)
     reason = trace = ""
     try:
-        if order.people:
-            _play_people(order, recording)
-        else:
-            run_virtual(_play_robot(order, recording))
+        run_virtual(_play(order, recording))
     except TimeoutError:
         reason = f"not over after {order.limit:g} s"
     except Exception as error:  # a bug of ours: this session tells of it, the others go on
@@ -83,26 +70,10 @@ def play(order: Order) -> SessionResult:
     return SessionResult(record=record, events=events, trace=trace)
 
 
-async def _play_robot(order: Order, recording: SessionRecorder) -> None:
+async def _play(order: Order, recording: SessionRecorder) -> None:
     """Play the tangram. Raises TimeoutError at the limit."""
     async with asyncio.timeout(order.limit):
         await play_tangram(order.config, (recording,))
-
-
-def _play_people(order: Order, recording: SessionRecorder) -> None:
-    config = order.config.recognition
-    session, tally = Session(order.config.robot, config), EventTally(config.window)
-    plan = human_session.draw(random.Random(order.seed))
-    observations = human_session.observations(plan)
-    effects = [effect for observation, at in observations for effect in session.feed(observation, at)]
-    effects += session.advance(observations[-1][1] + A_WHILE)
-    changes = [effect for effect in effects if isinstance(effect, ConnectionEvent)]
-    for change in changes:
-        tally.feed(change)
-        recording(change, change.at.seconds)
-    end = Stamp("loop", observations[-1][1])
-    statistics = Statistics(actor="", at=end, session=tally.session(), recent=WindowStatistics())
-    recording(statistics, end.seconds)
 
 
 def _reason(error: BaseException) -> str:

@@ -24,7 +24,6 @@ from engage_hri.services.commandline.shell.settings import TRANSCRIPT
 from engage_hri.services.commandline.study.progress import ProgressReport
 from engage_hri.services.commandline.study.session import Order, SessionResult
 from engage_hri.services.commandline.study.tables import PLOTS, Draw, plotting, rendered
-from engage_hri.services.commandline.study.validation import beside_table_2_1
 from engage_hri.services.commandline.study.workers import play_all
 from engage_hri.services.runtime.service import installed_version
 from engage_hri.services.study import files, summary
@@ -33,13 +32,9 @@ from engage_hri.services.study.hypotheses import HypothesisResult, findings
 from engage_hri.services.study.records import SessionRecord
 from engage_hri.services.study.summary import NumberTable
 
-PEOPLE = "table-2-1"
-"""Name of the human for sessions of two people, without a robot and so without a condition."""
-TWO_PEOPLE = "human-human"
-"""Value of their column `condition`."""
 BY_WORDS = ("collaboration.mode=task",)
 """Setting for people who follow the robot's words and no script: the robot may choose its words."""
-USUAL = {"listening": BY_WORDS, "stochastic": BY_WORDS, PEOPLE: ()}
+USUAL = {"listening": BY_WORDS, "stochastic": BY_WORDS}
 """Settings for each human, weaker than the user's; humans that are not listed act the transcript."""
 DECIDED = {
     "simulation.human": "--human",
@@ -64,8 +59,8 @@ class Options(Configured):
         ),
     ] = None
     human: Annotated[
-        Literal["stochastic", "listening", "appendix-b", "misplacing", "table-2-1"],
-        typer.Option(help="How the simulated human behaves; table-2-1: two people and no robot."),
+        Literal["stochastic", "listening", "appendix-b", "misplacing"],
+        typer.Option(help="How the simulated human behaves."),
     ] = "stochastic"
     resolution: Resolution = None
     jobs: Annotated[
@@ -102,7 +97,7 @@ def main(options: Options) -> int:
         records = [one.record for one in played]
         found = findings(records)
         ordered = Counter(order.condition for order in orders)
-        tables = tables_of(records, found, ordered, people=options.human == PEOPLE)
+        tables = tables_of(records, found, ordered)
         folder.write(contents(options, orders, played, found, tables, draw))
         for table in tables:
             console.print("", rendered(table), sep="\n")
@@ -121,10 +116,6 @@ def orders_of(options: Options) -> list[Order]:
         key = setting.partition("=")[0].strip()
         if key in DECIDED:
             raise InputRefused(Fault(reason=f"a study decides {key!r} itself", advice=f"use {DECIDED[key]}"))
-    if options.human == PEOPLE:
-        if options.condition:
-            raise InputRefused(Fault(reason=f"--human {PEOPLE} has no conditions", advice="leave out --condition"))
-        return [_order(options, TWO_PEOPLE, number) for number in range(options.sessions)]
     conditions = dict.fromkeys(options.condition or CONDITIONS)
     for condition in conditions:
         if condition not in CONDITIONS:
@@ -135,26 +126,23 @@ def orders_of(options: Options) -> list[Order]:
 
 def _order(options: Options, condition: str, number: int) -> Order:
     """Make one order. The user's settings override what makes a condition worse, but not seed and condition."""
-    seed, people = options.seed + number, options.human == PEOPLE
-    defaults = [*USUAL.get(options.human, TRANSCRIPT)]
-    chosen = [*simulation_settings(seed, None if people else options.human, options.resolution)]
-    if not people:
-        defaults += DEGRADATIONS[condition]
-        chosen.append(f"generation.condition={condition}")
+    seed = options.seed + number
+    defaults = [*USUAL.get(options.human, TRANSCRIPT), *DEGRADATIONS[condition]]
+    chosen = [
+        *simulation_settings(seed, options.human, options.resolution), f"generation.condition={condition}",
+    ]  # fmt: skip
     config = replace(options, settings=[*options.overrides, *chosen]).read(Config, defaults=defaults)
-    return Order(session=number, condition=condition, seed=seed, limit=options.limit, config=config, people=people)
+    return Order(session=number, condition=condition, seed=seed, limit=options.limit, config=config)
 
 
 # -- what came of it --------------------------------------------------------------------------------------------
 
 
 def tables_of(
-    records: Sequence[SessionRecord], found: Sequence[HypothesisResult], ordered: Mapping[str, int], *, people: bool
+    records: Sequence[SessionRecord], found: Sequence[HypothesisResult], ordered: Mapping[str, int]
 ) -> list[NumberTable]:
     """Tables for the terminal and for summary.md. ordered: number of sessions by condition, played or not."""
     tables = [summary.overview(records, ordered)]
-    if people:
-        tables.append(beside_table_2_1(records))
     if found:
         tables.append(summary.hypotheses(found))
     if any(not record.finished for record in records):

@@ -35,7 +35,7 @@ from engage_hri.services.commandline.talk.prose import Prose, Warnings, strict_r
 from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.console.terminal.live import Log
 from engage_hri.services.console.terminal.log import Telling
-from engage_hri.services.generation.service import WORLD_PATIENCE
+from engage_hri.services.generation.intake import WORLD_PATIENCE
 
 NOTHING = World(entities=())
 PATIENCE: Seconds = 5.0

@@ -4,8 +4,8 @@ from engage_hri.schemas.body import Capabilities, RobotState
 from engage_hri.schemas.units import Radians, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.console.view import Actor, Scene
+from engage_hri.services.console.web import above
 from engage_hri.services.console.web.sections import Above, Arm, BodyShown, PersonShown, SceneSection, Thing
-from engage_hri.services.recording import above
 
 HALF_ANGLE: Radians = 0.1
 """Half the angle of the gaze cone of a body that has not said its own."""

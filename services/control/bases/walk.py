@@ -23,14 +23,17 @@ The walk knows loop time alone, and nothing of joints: the same walk serves form
 
 import asyncio
 from abc import abstractmethod
-from collections.abc import AsyncGenerator, Sequence
+from collections import defaultdict
+from collections.abc import AsyncGenerator, Collection
 from contextlib import aclosing
 from math import inf
-from typing import Generic, TypeVar
+from typing import Generic
 
-from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.behaviors import BlockBehavior, Wait
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.contract.bell import Bell
+from engage_hri.services.control.bases.moving_parts import MovingParts, R
+from engage_hri.services.control.bases.watch import PATIENCE, Watch
+from engage_hri.services.control.contract.bell import EARLY, Bell
 from engage_hri.services.control.contract.body import (
     Arrived,
     BehaviorRefused,
@@ -38,11 +41,11 @@ from engage_hri.services.control.contract.body import (
     MovementAuthority,
     Progress,
     Reached,
+    TakenOver,
 )
 from engage_hri.services.control.contract.refusals import Impossible
-from engage_hri.services.control.motion.motion import Motion
-from engage_hri.services.control.motion.path import Path
 from engage_hri.services.control.motion.points import WalkPoint
+from engage_hri.services.control.voice import speaking
 
 FREEZE: Seconds = 0.5
 """Seconds that a part stands still when it is told to freeze, before it relaxes."""
@@ -50,110 +53,15 @@ CATCHES_UP: Seconds = 0.02
 """Seconds between two looks at whether it has come to a target that has moved."""
 
 
-class Run:
-    """A behavior that is being performed. bell: rings when its authority, its joints or its target have news.
+class WalkingBody(Body, Generic[R]):
+    """A body whose behaviors walk through their sync points. A driver on it says what is measured.
 
-    pending: sync points that it has not passed. motion: of its joints, from when it was given its parts.
-    holding: it waits at a hold point, standing or still coming to a stop.
+    moves: its parts, and where they go.
     """
 
-    motion: Motion
-
-    def __init__(self, behavior: BlockBehavior, points: Sequence[WalkPoint], authority: MovementAuthority) -> None:
-        self.behavior = behavior
-        self.authority = authority
-        self.bell = Bell()
-        self.pending: list[WalkPoint] = list(points)
-        self.holding = False
-        self.is_beneath = False
-        """True for a shift of the head that a look lies over: it moves no more, and takes nothing from the look."""
-        self._is_held = False
-        self._missed: frozenset[str] = frozenset()
-        """Hold points at which it could not stop any more when it was told to wait."""
-
-    def awaits(self, sync: str) -> bool:
-        """True if it has not passed a sync point yet."""
-        return any(point.sync == sync for point in self.pending)
-
-    @property
-    def is_over(self) -> bool:
-        """True once it moves its parts no more, or has lost them."""
-        return self.is_beneath or self.authority.revoked is not None
-
-    @property
-    def is_taken_over(self) -> bool:
-        """True once another behavior has taken one of its parts."""
-        return self.authority.revoked == "taken_over"
-
-    @property
-    def stands(self) -> bool:
-        """True if it has come to a stop where it has to wait."""
-        return self.holding and self.bell.is_past(self.motion.end)
-
-    def may_pass(self, hold: str) -> bool:
-        """True if it may go on from a hold point now, or has to, since it could stop there no more."""
-        return self.authority.covers(hold) or hold in self._missed
-
-    def waits_at(self, point: WalkPoint) -> bool:
-        """True if it may not pass a sync point yet."""
-        return bool(point.held_with) and not self.may_pass(point.held_with)
-
-    def limit(self, path: Path) -> Seconds:
-        """Position on `path`, in its natural seconds, up to which it may go now."""
-        for point in self.pending:
-            if not point.is_told or self.waits_at(point):
-                return path.marks.get(point.stands_at or point.sync, inf)
-        return inf
-
-    def due(self, point: WalkPoint) -> Seconds | None:
-        """Instant at which the plan passes `point`; None if it does not go so far yet."""
-        mark = self.motion.path.marks.get(point.sync)
-        return None if mark is None else self.motion.crossing(mark)
-
-    def brake_for_hold(self, now: Seconds) -> None:
-        """While the behavior is held, stop at the next hold point where the joints can."""
-        is_news, self._is_held = self.authority.held and not self._is_held, self.authority.held
-        if not self._is_held:
-            self._missed = frozenset()
-            return
-        if is_news:
-            marks = self.motion.path.marks
-            self._missed = frozenset(
-                point.held_with
-                for point in self.pending
-                if point.held_with
-                and self.authority.is_granted(point.held_with)
-                and not self.motion.can_stop_at(marks.get(point.stands_at or point.sync, inf), now)
-            )
-        if (limit := self.limit(self.motion.path)) < self.motion.limit:
-            self.motion.brake(now, limit)
-
-    def leave(self, hold: str, now: Seconds) -> list[str]:
-        """Stop waiting at `hold`; return the sync points passed. The same place may be another hold point, too."""
-        passed = [point.sync for point in self.pending if point.held_with == hold]
-        self.pending = [point for point in self.pending if point.held_with != hold]
-        following = next(point for point in self.pending if point.is_told)
-        here = self.motion.s(now) + 1e-9
-        is_here = following.held_with and self.motion.path.marks.get(following.sync, inf) <= here
-        self.holding = self.stands and bool(is_here)
-        return passed
-
-    def passed_by(self, at: Seconds) -> list[tuple[str, Seconds]]:
-        """Sync points that it has passed by then and not reported yet, each with its instant."""
-        passed: list[tuple[str, Seconds]] = []
-        for point in () if self.holding else self.pending:
-            due = self.due(point) if point.is_told else None
-            if due is None or due > at or self.waits_at(point):
-                break
-            passed.append((point.sync, due))
-        return passed
-
-
-R = TypeVar("R", bound=Run)
-
-
-class WalkingBody(Body, Generic[R]):
-    """A body whose behaviors walk through their sync points. A driver on it says what moves, and what is measured."""
+    moves: MovingParts[R]
+    patience: Seconds = PATIENCE
+    """Seconds without any way after which joints on their way home are stuck."""
 
     def __init__(self) -> None:
         """Make the body, in a running event loop."""
@@ -163,32 +71,7 @@ class WalkingBody(Body, Generic[R]):
 
     @abstractmethod
     def set_out(self, behavior: BlockBehavior, authority: MovementAuthority) -> R:
-        """Give a behavior its parts, cut those that had them, and start its motion. Raises Impossible.
-
-        A shift of the head beneath a look takes no part: it comes back as `is_beneath`.
-        """
-
-    @abstractmethod
-    def leave(self, run: R, point: WalkPoint, *, has_waited: bool) -> Sequence[str]:
-        """Let a behavior go on behind a point. has_waited: at this hold point. Returns the sync points passed."""
-
-    @abstractmethod
-    def owns(self, run: R) -> bool:
-        """True if a behavior has any part."""
-
-    @abstractmethod
-    def release(self, run: R) -> None:
-        """Take from a behavior the parts that it still has."""
-
-    @abstractmethod
-    def abandon(self, run: R) -> None:
-        """Send home the parts of a behavior that has ended early. A shift of the head stays where it can stop."""
-
-    def extend(self, run: R) -> None:
-        """Let a behavior go as far as its authority says now. A body that can be faster or slower does that, too."""
-        now = self._loop.time()
-        run.motion.extend(run.limit(run.motion.path), now)
-        run.brake_for_hold(now)
+        """Begin a behavior: `MovingParts.set_out`. Raises BehaviorRefused, Impossible."""
 
     def due(self, run: R, point: WalkPoint) -> Seconds | None:
         """Instant at which the plan of a behavior passes a point; None: it does not go so far yet."""
@@ -216,11 +99,33 @@ class WalkingBody(Body, Generic[R]):
         """True if a behavior that waits on its target is still on its way to where that has moved."""
         return False
 
-    def stop(self, run: R) -> None:
-        """Stop the motion of a behavior as soon as its joints can: it is to freeze."""
-        run.motion.brake(self._loop.time())
+    def coming_home(self, going: Collection[str], watches: defaultdict[str, Watch]) -> Seconds | None:
+        """Look if the joints of these tracks are at home; None: they are. Returns when to look again (inf: on news).
+
+        watches: of their joints, since they have set out. Raises BodyFailed: they make no way any more.
+        """
+        until: Seconds = max((self.moves.tracks[name].motion.end for name in going), default=0.0)
+        return None if self._loop.time() >= until - EARLY else until
 
     # -- the walk -----------------------------------------------------------------------------------------------
+
+    def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
+        return speaking.wait(behavior, authority) if isinstance(behavior, Wait) else self.walk(behavior, authority)
+
+    async def home(self, parts: tuple[str, ...] = ()) -> None:
+        going, watches, bell = (
+            self.moves.go_home(parts),
+            defaultdict[str, Watch](lambda: Watch(self.patience)),
+            Bell(),
+        )
+        self.moves.homeward.append(bell)
+        try:
+            while (until := self.coming_home(going, watches)) is not None:
+                await bell.wait(until)
+                if taken := sorted({self.moves.tracks[name].part for name in going if name in self.moves.runs}):
+                    raise TakenOver(taken)
+        finally:
+            self.moves.homeward.remove(bell)
 
     async def walk(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         """Perform a behavior that moves parts. Raises BehaviorRefused, BodyFailed."""
@@ -238,15 +143,15 @@ class WalkingBody(Body, Generic[R]):
                 async with aclosing(self._pass_beneath(run)) as points:
                     async for progress in points:
                         yield progress
-            if authority.revoked == "freeze" and self.owns(run):
+            if authority.revoked == "freeze" and self.moves.owns(run):
                 await self._freeze(run)
         finally:
             unwatch()
             # After an abort, a failure or a cancelled task the parts go home by themselves.
-            if self.owns(run):
-                self.release(run)
+            if self.moves.owns(run):
+                self.moves.release(run)
                 if run.pending:
-                    self.abandon(run)
+                    self.moves.abandon(run)
 
     async def _pass_points(self, run: R) -> AsyncGenerator[Progress, None]:
         """Report the sync points of `run` as it crosses them, until it is done, cut or revoked. Raises BodyFailed."""
@@ -254,7 +159,7 @@ class WalkingBody(Body, Generic[R]):
         while run.pending and not run.is_over:
             self.check(run)
             if not run.holding:
-                self.extend(run)
+                self.moves.extend(run)
             point = run.pending[0]
             due = self.due(run, point)
             if not run.holding and (due is None or not run.bell.is_past(due)):
@@ -270,12 +175,12 @@ class WalkingBody(Body, Generic[R]):
                     yield Arrived(point.held_with, arrived)
                 if await self._wait_to_go_on(run, point):
                     since = self._loop.time()
-                    for sync in self.leave(run, point, has_waited=True):
+                    for sync in self.moves.leave(run, point, has_waited=True):
                         yield Reached(sync, since, arrived)
             else:
                 self.confirm(run, point.sync)
                 came = max(came, since)
-                for sync in self.leave(run, point, has_waited=False):
+                for sync in self.moves.leave(run, point, has_waited=False):
                     yield Reached(sync, came, came)
         if run.is_beneath or run.is_taken_over:
             for sync, due in run.passed_by(self._loop.time()):
@@ -313,7 +218,7 @@ class WalkingBody(Body, Generic[R]):
             yield Reached("end", at := self._loop.time(), at)
 
     async def _freeze(self, run: R) -> None:
-        self.stop(run)
+        self.moves.stop(run)
         until = run.motion.end + FREEZE
-        while self.owns(run) and not run.bell.is_past(until):
+        while self.moves.owns(run) and not run.bell.is_past(until):
             await run.bell.wait(until)

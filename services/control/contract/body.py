@@ -31,7 +31,7 @@ Revocation = Literal["relax", "freeze", "taken_over"]
 """How a behavior ends early: by an abort, or since the body gives one of its parts to another behavior."""
 
 
-class Arrived(Struct, frozen=True):
+class Arrived(Struct, frozen=True, tag="arrived"):
     """The body has come to a hold point that it may not pass yet, and waits there.
 
     sync: its name. at: loop time, seconds.
@@ -41,7 +41,7 @@ class Arrived(Struct, frozen=True):
     at: Seconds
 
 
-class Reached(Struct, frozen=True):
+class Reached(Struct, frozen=True, tag="reached"):
     """The body has passed a sync point.
 
     sync: its name. at: loop time, seconds. arrived: when it had come there; earlier than `at` if it had
@@ -53,7 +53,7 @@ class Reached(Struct, frozen=True):
     arrived: Seconds
 
 
-class Spoke(Struct, frozen=True):
+class Spoke(Struct, frozen=True, tag="spoke"):
     """The voice has finished a word.
 
     word: as it stands in the text. position: characters of the text said so far. at: loop time, seconds.

@@ -72,13 +72,13 @@ def plan(behavior: BlockBehavior, situation: Situation) -> Course:
 def _planned(behavior: BlockBehavior, situation: Situation) -> Course:
     match behavior:
         case Gaze():
-            return _noted(_glance(_gaze_aim(behavior, situation), situation), behavior)
+            return replace(_glance(_gaze_aim(behavior, situation), situation), note=note_on(behavior))
         case GazeShift():
-            return _noted(_shift(_gaze_aim(behavior, situation), situation), behavior)
+            return replace(_shift(_gaze_aim(behavior, situation), situation), note=note_on(behavior))
         case HeadDirectionShift(target=target):
             return _shift(_neck_aim(target, 0.0, "", situation), situation)
         case Pointing(target=target, mode=mode):
-            return _point(_entity(target, situation.world), mode, situation)
+            return _point(entity_of(target, situation.world), mode, situation)
         case Gesture(lexeme=lexeme, mode=mode):
             return expressions.gesture(lexeme, mode, situation)
         case Head():
@@ -102,7 +102,8 @@ def _planned(behavior: BlockBehavior, situation: Situation) -> Course:
             raise Impossible("BEHAVIOR_TYPE_NOT_SUPPORTED", f"this body has no {type(behavior).__name__.lower()}")
 
 
-def _entity(target: str, world: World) -> Entity:
+def entity_of(target: str, world: World) -> Entity:
+    """Look up the entity that a target names. Raises Impossible."""
     if (entity := world.entity(target)) is None:
         advice = suggestion(target, (each.id for each in world.entities), "it is empty")
         raise Impossible("NO_SUCH_TARGET", f"the world has no {target!r}", advice)
@@ -110,7 +111,7 @@ def _entity(target: str, world: World) -> Entity:
 
 
 def _neck_aim(target: str, offset: Degrees, direction: str, situation: Situation) -> Looked:
-    entity = _entity(target, situation.world)
+    entity = entity_of(target, situation.world)
     try:
         free = kinematics.look_at(entity.position, situation.pose, kinematics.NOD_RESERVE)
     except Unreachable as error:
@@ -159,15 +160,17 @@ def _gaze_aim(behavior: Gaze | GazeShift, situation: Situation) -> Looked:
     return _neck_aim(behavior.target, behavior.offset_angle, behavior.offset_direction, situation)
 
 
-def _noted(made: Course, behavior: Gaze | GazeShift) -> Course:
-    """Note what this neck does otherwise than a gaze asks."""
+def note_on(look: Gaze | GazeShift | HeadDirectionShift) -> str:
+    """Note what a neck does otherwise than a look asks."""
+    if isinstance(look, HeadDirectionShift):
+        return ""
     notes = []
-    if behavior.influence.upper() not in ("", "HEAD"):
-        notes.append(f"this body has no influence {behavior.influence!r} of a gaze; it turns the 'HEAD', the nearest")
-    if behavior.offset_angle and normal(behavior.offset_direction) not in OFFSETS:
-        asked = f"offsetDirection {behavior.offset_direction!r}"
-        notes.append(f"this body has no {asked} of a gaze; it looks at {behavior.target!r} itself, the nearest")
-    return replace(made, note="; ".join(notes)) if notes else made
+    if look.influence.upper() not in ("", "HEAD"):
+        notes.append(f"this body has no influence {look.influence!r} of a gaze; it turns the 'HEAD', the nearest")
+    if look.offset_angle and normal(look.offset_direction) not in OFFSETS:
+        asked = f"offsetDirection {look.offset_direction!r}"
+        notes.append(f"this body has no {asked} of a gaze; it looks at {look.target!r} itself, the nearest")
+    return "; ".join(notes)
 
 
 def _point(entity: Entity, mode: str | None, situation: Situation) -> Course:

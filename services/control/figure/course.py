@@ -7,10 +7,11 @@ from msgspec import Struct
 
 from engage_hri.schemas.body import NoPointZone, Ray
 from engage_hri.schemas.world import World
-from engage_hri.services.control.figure.aiming import UPRIGHT, Aim, Trunk
+from engage_hri.services.control.figure.aiming import UPRIGHT, Aim
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.motion.path import Leg
 from engage_hri.services.control.motion.points import WalkPoint
+from engage_hri.services.control.motion.track import Trunk
 
 
 class Course(Struct, frozen=True, kw_only=True):
@@ -36,6 +37,11 @@ class Course(Struct, frozen=True, kw_only=True):
     def arrival(self) -> str:
         """The sync point that says that a behavior has come to its target."""
         return "stroke" if any(point.sync == "stroke" for point in self.points) else "end"
+
+    @property
+    def stays(self) -> bool:
+        """True for a shift: it goes nowhere from its goal."""
+        return len(self.points) == 2
 
     @property
     def goal(self) -> tuple[float, ...]:

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Wait
 from engage_hri.schemas.body import BodyPose, Estimate, Phase
-from engage_hri.schemas.units import Degrees, Seconds
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.figure.course import Course
 from engage_hri.services.control.figure.sizing import quickest
@@ -23,48 +23,39 @@ Added = Callable[[Seconds], Array]
 
 
 def wait_estimate(behavior: Wait, duration: Seconds, pose: BodyPose) -> Estimate:
-    phases = _phases((WalkPoint("start"), WalkPoint("end", "end")), {"start": 0.0, "end": duration})
-    return Estimate(behavior=behavior.id, feasible=True, phases=phases, pose_after=pose, pose_end=pose)
+    told = phases((WalkPoint("start"), WalkPoint("end", "end")), {"start": 0.0, "end": duration})
+    return Estimate(behavior=behavior.id, feasible=True, phases=told, pose_after=pose, pose_end=pose)
 
 
 def motion_estimate(
     behavior: BlockBehavior,
     course: Course,
     path: Path,
-    pose: BodyPose,
-    pose_end: BodyPose,
+    here: Mapping[str, float],
     added: Added | None = None,
+    only: str = "",
 ) -> Estimate:
-    """Estimate a behavior that moves along `path`. pose, pose_end: joint angles on target, and at the end.
+    """Estimate a behavior that moves along `path`. here: joint angles at its start.
 
-    added: what the trunk adds to the path, if it moves.
+    added: what the trunk adds to the path, if it moves. only: what is asked, as of `EstimateItem`.
     """
     degrees = 0.0
     if is_gaze(course) or is_arm(course):
         until = path.marks.get("stroke", path.length)
         degrees = math.degrees(path.travel(until) if added is None else _travel(path, until, added))
-    phases = _phases(course.points, path.marks, quickest(course, path), SLOWEST, path.gentlest_brake)
-    return replace(posture_estimate(behavior, course, degrees, (pose, pose_end)), phases=phases)
-
-
-def posture_estimate(
-    behavior: BlockBehavior, course: Course, degrees: Degrees, poses: tuple[BodyPose, BodyPose] | None
-) -> Estimate:
-    """Estimate a behavior without phases. degrees: of head or arm, to the target.
-
-    poses: on target, at the end; None: not asked for, and neither is the ray.
-    """
-    return Estimate(
+    estimate = Estimate(
         behavior=behavior.id,
         feasible=True,
         degraded=course.note,
         parts=("head",) if course.parts == ("nod",) else course.parts,
         head_degrees=degrees if is_gaze(course) else 0.0,
         arm_degrees=degrees if is_arm(course) else 0.0,
-        ray=course.ray if poses else None,
-        pose_after=poses[0] if poses else None,
-        pose_end=poses[1] if poses else None,
     )
+    if only == "degrees":
+        return estimate
+    told = () if only else phases(course.points, path.marks, quickest(course, path), SLOWEST, path.gentlest_brake)
+    pose, pose_end = poses(course, here)
+    return replace(estimate, ray=course.ray, pose_after=pose, pose_end=pose_end, phases=told)
 
 
 def is_gaze(course: Course) -> bool:
@@ -110,7 +101,7 @@ def _travel(path: Path, until: Seconds, added: Added) -> float:
     return sum(float(np.sum(np.abs(after - before))) for before, after in pairwise(seen))
 
 
-def _phases(
+def phases(
     points: Sequence[WalkPoint],
     times: Mapping[str, Seconds],
     quickest: Mapping[str, Seconds] | None = None,
@@ -127,7 +118,7 @@ def _phases(
         Phase(
             since=since.sync,
             to=to.sync,
-            shortest=min(least[to.sync] - least[since.sync], natural := times[to.sync] - times[since.sync]),
+            shortest=max(0.0, min(least[to.sync] - least[since.sync], natural)),
             natural=natural,
             longest=None
             if to.held_with or not natural
@@ -135,6 +126,7 @@ def _phases(
             hold=to.held_with == to.sync,
         )
         for since, to in pairwise(points)
+        for natural in [max(0.0, times[to.sync] - times[since.sync])]
     )
 
 

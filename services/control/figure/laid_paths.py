@@ -12,9 +12,9 @@ import numpy as np
 
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import tracks
-from engage_hri.services.control.figure.aiming import Trunk
 from engage_hri.services.control.figure.course import Course
 from engage_hri.services.control.motion.path import JointMotion, Leg, Path
+from engage_hri.services.control.motion.track import Trunk
 
 KEPT = 128
 """Paths that are kept, the latest used. A fragment asks for some ten, and its behaviors then move along them."""

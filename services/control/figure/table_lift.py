@@ -8,7 +8,8 @@ import numpy as np
 from engage_hri.schemas.units import Meters, Radians
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import kinematics, tracks
-from engage_hri.services.control.figure.aiming import UPRIGHT, Trunk
+from engage_hri.services.control.figure.aiming import UPRIGHT
+from engage_hri.services.control.motion.track import Trunk
 
 Pose = tuple[float, ...]
 """Angles of the joints of one arm, or of both."""

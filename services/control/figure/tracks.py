@@ -13,10 +13,11 @@ import numpy as np
 from engage_hri.schemas.body import BodyPose, JointLimit
 from engage_hri.schemas.units import Meters, Seconds
 from engage_hri.services.control.figure import kinematics
-from engage_hri.services.control.figure.aiming import NECK, TRUNK, UPRIGHT, Aim, Trunk
+from engage_hri.services.control.figure.aiming import NECK, TRUNK, UPRIGHT, Aim
 from engage_hri.services.control.figure.pace import return_time, turning_time
 from engage_hri.services.control.motion.motion import Motion
-from engage_hri.services.control.motion.path import Array, JointMotion, Leg, Path, resting
+from engage_hri.services.control.motion.path import Array, JointMotion, Leg, Path
+from engage_hri.services.control.motion.track import Track, Trunk
 
 ALONG = np.linspace(0.0, 1.0, 17)
 """Shares of a path's length at which it is held against the table."""
@@ -71,61 +72,15 @@ def home_of(part: str, displaced: Mapping[str, float]) -> tuple[float, ...]:
     return tuple(angle if part == "nod" else displaced.get(limit.joint, angle) for limit, angle in home)
 
 
-class Track:
-    """The motion of one part. Two arms that move as one share a motion, each with its columns of it.
+class PartTrack(Track[Aim]):
+    """The motion of one part of the torso: a path that comes home clear of the table."""
 
-    base: angles to which the part goes back; those of the safe pose until a shift changes them. aim: the place that
-    it is on, or on its way to; None: it moves with the trunk. trunk: the track of the torso.
-    """
-
-    def __init__(self, part: str, angles: Sequence[float]) -> None:
-        self.part = part
-        self.base = HOME[part]
-        self.aim: Aim | None = None
-        self.trunk = self
-        self.joints = tuple(limit.joint for limit in LIMITS[part])
-        self.motion = Motion(Path(resting(angles), (), LIMITS[part]), 0.0)
-        self.columns = slice(0, len(self.joints))
-        """Which of the joints of the motion are its own."""
-        self._last: Array | None = None
-        """Position whose angles are known as numbers: of a motion that is over, it is the same all the time."""
-        self._angles: tuple[float, ...] = ()
-
-    def play(self, motion: Motion, column: int = 0, aim: Aim | None = None) -> None:
-        self.motion, self.aim, self._last = motion, aim, None
-        self.columns = slice(column, column + len(self.joints))
-
-    def at(self, t: Seconds) -> JointMotion:
-        state, columns = self.motion.at(t), self.columns
-        state = JointMotion(state.q[columns], state.v[columns], state.a[columns])
-        if self.aim is None or self.is_still(t, self.aim):
-            return state
-        state = self.aim.added(state, self.trunk.at(t))
-        return JointMotion(self.aim.within(state.q), state.v, state.a)
-
-    def start_at(self, t: Seconds, aim: Aim | None) -> JointMotion:
-        """State in which a path with this aim begins."""
-        state = self.at(t)
-        return state if aim is None or self.is_still(t, aim) else aim.removed(state, self.trunk.at(t))
+    def __init__(self, name: str, angles: Sequence[float]) -> None:
+        super().__init__(name, LIMITS[name], HOME[name], angles)
 
     def limits(self, t: Seconds, aim: Aim | None) -> tuple[JointLimit, ...]:
         """Limits of a path with this aim that begins then."""
-        return limits_of((self.part,), is_free=aim is not None and not self.is_still(t, aim))
-
-    def is_still(self, t: Seconds, aim: Aim) -> bool:
-        """True if the trunk rests where the path of an aim supposes it."""
-        return not self.trunk.is_moving(t) and aim.is_laid_for(self.trunk.angles(t))
-
-    def angles(self, t: Seconds) -> tuple[float, ...]:
-        position, columns = self.motion.position(t), self.columns
-        if self.aim is not None and not self.is_still(t, self.aim):
-            return tuple(self.aim.within(position[columns] + self.aim.offset(self.trunk.angles(t))).tolist())
-        if position is not self._last:
-            self._last, self._angles = position, tuple(position[columns].tolist())
-        return self._angles
-
-    def is_moving(self, t: Seconds) -> bool:
-        return t < self.motion.end
+        return limits_of((self.name,), is_free=aim is not None and not self.is_still(t, aim))
 
     def return_to(
         self, goal: tuple[float, ...], now: Seconds, aim: Aim | None = None, trunks: Sequence[Trunk] = (UPRIGHT,)
@@ -135,7 +90,7 @@ class Track:
         aim: the place that it is on at `goal`. trunks: where the trunk may be meanwhile.
         """
         start = self.start_at(now, aim)
-        time = turning_time if self.part in ("head", "nod") else return_time
+        time = turning_time if self.part == "head" else return_time
         seconds = time(start.q.tolist(), goal)
         direct = Path(start, (Leg(goal=goal, seconds=seconds),), self.limits(now, aim))
         if not meets_table(direct, self.joints, trunks):
@@ -153,7 +108,7 @@ class Track:
             for above in raised(self.angles(now), self.joints)
         ]
         # Or with the elbow bent all the way.
-        bent, (yaw, pitch, _) = LIMITS[self.part][2].high, self.angles(now)
+        bent, (yaw, pitch, _) = self.own_limits[2].high, self.angles(now)
         ways.append(
             (
                 Leg(goal=(yaw, pitch, bent), seconds=max(RAISING, rising)),
@@ -163,7 +118,7 @@ class Track:
         )
         found, best = Motion(direct, now), -math.inf
         for legs in ways:
-            motion = Motion(Path(start, legs, LIMITS[self.part]), now)
+            motion = Motion(Path(start, legs, self.own_limits), now)
             if (above := self._above_table(motion, now)) > best:
                 found, best = motion, above
             if best >= 0.0:
@@ -185,19 +140,13 @@ def raised(arm: tuple[float, ...], joints: Sequence[str]) -> Iterator[tuple[floa
         yield (yaw, min(max(pitch, 0.2) + up, highest[1]), min(elbow + 2 * up, highest[2]))
 
 
-def bases(tracks: Mapping[str, Track]) -> dict[str, float]:
+def bases(tracks: Mapping[str, PartTrack]) -> dict[str, float]:
     """Angles of all joints to which their parts go back."""
     based = {part: track for part, track in tracks.items() if part != "nod"}
     return {
         **kinematics.HOME,
         **{joint: angle for track in based.values() for joint, angle in zip(track.joints, track.base, strict=True)},
     }
-
-
-def rebase(tracks: Mapping[str, Track], parts: Sequence[str], angles: Mapping[str, float] = kinematics.HOME) -> None:
-    """Change the angles to which parts go back; by default to those of the safe pose."""
-    for track in (tracks[part] for part in parts):
-        track.base = tuple(angles.get(joint, angle) for joint, angle in zip(track.joints, track.base, strict=True))
 
 
 def limits_of(parts: Sequence[str], *, is_free: bool = False) -> tuple[JointLimit, ...]:
@@ -281,12 +230,12 @@ def _by_side(angles: Array, joints: Sequence[str], trunks: Array | None) -> Iter
             yield kinematics.above_table(side, arm, trunks)
 
 
-def pose_at(tracks: Mapping[str, Track], t: Seconds) -> dict[str, float]:
+def pose_at(tracks: Mapping[str, PartTrack], t: Seconds) -> dict[str, float]:
     """The angle of every joint, nod included."""
     return pose_of(tracks, [track.angles(t) for track in tracks.values()])
 
 
-def pose_of(tracks: Mapping[str, Track], angles: Iterable[Sequence[float]]) -> dict[str, float]:
+def pose_of(tracks: Mapping[str, PartTrack], angles: Iterable[Sequence[float]]) -> dict[str, float]:
     """The angle of every joint, nod included, from those of each track."""
     pose: dict[str, float] = {}
     for (part, track), own in zip(tracks.items(), angles, strict=True):

@@ -6,7 +6,8 @@ make no way any more fails with the name of the joint. The face is a screen: it 
 """
 
 import math
-from collections.abc import AsyncGenerator, AsyncIterator, Iterable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import AsyncGenerator, AsyncIterator, Collection, Iterable, Mapping, Sequence
 from contextlib import aclosing, asynccontextmanager
 from math import inf
 from pathlib import Path
@@ -20,30 +21,38 @@ from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
+from engage_hri.services.control.bases.watch import Off, Watch, farthest
 from engage_hri.services.control.config import ControlConfig, Variability
-from engage_hri.services.control.contract.bell import Bell
 from engage_hri.services.control.contract.body import Body, BodyFailed, BodyState, MovementAuthority, Progress
 from engage_hri.services.control.contract.extras import Idle, Seen
 from engage_hri.services.control.figure import kinematics, tracks
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.figure.repertoire_files import repertoire_of
-from engage_hri.services.control.figure.tracks import Track
+from engage_hri.services.control.figure.tracks import PartTrack
 from engage_hri.services.control.motion.points import WalkPoint
-from engage_hri.services.control.mujoco import along
-from engage_hri.services.control.mujoco.along import Off, Watch
 from engage_hri.services.control.mujoco.described import DescribedBody
 from engage_hri.services.control.mujoco.faults import KINDS, OURS, SHARED, refuse, told
-from engage_hri.services.control.mujoco.film import Frame, filmed
-from engage_hri.services.control.mujoco.filming import film_of, finish, framed
-from engage_hri.services.control.mujoco.pulse import TICK, Pulse
+from engage_hri.services.control.mujoco.film import Frame, filming, framed
+from engage_hri.services.control.mujoco.pulse import TICK
 from engage_hri.services.control.mujoco.settings import MujocoSettings
-from engage_hri.services.control.mujoco.workbench import Workbench
-from engage_hri.services.control.torso import homing, truth
-from engage_hri.services.control.torso.body import SimulatedBody
+from engage_hri.services.control.mujoco.stage import Workbench
+from engage_hri.services.control.torso.body import SimulatedBody, seen_with
 from engage_hri.services.control.torso.runs import Run
 
 SAMPLES = 6
 """Places of a plan between a sync point and where the plan is, at which the joints may be to have come there."""
+
+
+NEAR: Mapping[str, Radians] = {
+    "head": math.radians(0.6), "nod": math.radians(0.6), "torso": math.radians(0.8), "left_arm": math.radians(1.5),
+    "right_arm": math.radians(1.5), "face": inf,
+}  # fmt: skip
+"""Radians by which a joint of a part may miss a sync point."""
+LAG: Mapping[str, Radians] = {
+    "head": math.radians(4.0), "nod": math.radians(4.0), "torso": math.radians(3.0), "left_arm": math.radians(6.0),
+    "right_arm": math.radians(6.0), "face": inf,
+}  # fmt: skip
+"""Radians by which a joint of a part may lag behind its plan before the plan waits."""
 
 
 class MujocoBody(SimulatedBody):
@@ -72,11 +81,11 @@ class MujocoBody(SimulatedBody):
             self.capabilities, body="mujoco", joints=tuple(map(_as_measured, self.capabilities.joints)),
             faults=KINDS, fault_kinds=told(OURS),
         )  # fmt: skip
-        self.bench = Workbench(self._plan(), self._loop.time(), self._settings.seed)
+        self.bench = Workbench(lambda now: tracks.pose_at(self.moves.tracks, now), self._look, self._settings.seed)
+        self.pulse = self.bench.pulse
         self._watches: dict[Run, Watch] = {}
         self._awaiting: dict[Run, WalkPoint] = {}
         """The sync point that joints have not come to, though the plan has."""
-        self.pulse = Pulse(step=self._compute, rise=self.bench.rise, after=self._look)
         self._faults: tuple[BodyFault, ...] = ()
         """Faults that the physics plays; the others are those of the simulated torso."""
         self.switch_faults([*super().faults, *self._settings.faults])
@@ -91,27 +100,19 @@ class MujocoBody(SimulatedBody):
 
     @asynccontextmanager
     async def connected(self) -> AsyncIterator[None]:
-        """Film it meanwhile, if the settings ask for that; the film is drawn at the end."""
-        async with super().connected():
-            film = film_of(self.bench.model, self._settings)
-            try:
-                async with filmed(film, self.frame):
-                    yield
-            finally:
-                self.pulse.stop()
-                if film is not None:
-                    finish(film, self._settings)
+        async with super().connected(), filming(self.bench.model, self._settings, self.frame, self.pulse):
+            yield
 
     def frame(self) -> Frame:
         """The body as a film shows it now."""
-        runs = self._torso.runs
+        runs = self.moves.runs
         pointing = {
             part: run.behavior.target
             for part, run in runs.items()
             if isinstance(run.behavior, Pointing) and run.awaits("stroke_end") and not run.awaits("stroke_start")
         }
         now, data = self._loop.time(), self.bench.physics.data
-        return framed(now, data, self.state(), self.others_say(), self._torso.world, pointing, self._face())
+        return framed(now, data, self.state(), self.others_say(), self.moves.world, pointing, self._face())
 
     # -- the contract -------------------------------------------------------------------------------------------
 
@@ -125,27 +126,28 @@ class MujocoBody(SimulatedBody):
             self.pulse.wake()
 
     async def home(self, parts: tuple[str, ...] = ()) -> None:
-        """Move to the safe pose, and return when the joints are there. Raises BodyFailed, TakenOver."""
         self.pulse.step()
         self.pulse.wake()
         await super().home(parts)
-        watch, bell = Watch(), Bell()
-        going = [part for part in tracks.LIMITS if part != "nod" and (not parts or part in parts)]
-        while (off := self._off(going, self._loop.time())) is not None and (
-            off.share > 1.0 or self._are_moving(going)
-        ):
-            watch.see(off, now := self._loop.time())
-            if off.share > 1.0 and (waited := watch.stuck(now)) is not None:
-                raise BodyFailed(self._stuck("home", off, waited))
-            self.pulse.wake()
-            await bell.wait(now + TICK)
-            homing.check(self._torso, going)
+
+    def coming_home(self, going: Collection[str], watches: defaultdict[str, Watch]) -> Seconds | None:
+        if (until := super().coming_home(going, watches)) is not None:
+            return until
+        now, names = self._loop.time(), [name for name in tracks.LIMITS if name != "nod" and name in going]
+        off = self._off(names, now)
+        if off is None or (off.share <= 1.0 and not self._are_moving(names)):
+            return None
+        watches["home"].see(off, now)
+        if off.share > 1.0 and watches["home"].is_stuck:
+            raise BodyFailed(self._stuck("home", watches["home"]))
+        self.pulse.wake()
+        return now + TICK
 
     def state(self) -> BodyState:
         self.pulse.step()
         now, pose = self._loop.time(), self._measured()
         arms = kinematics.arm(pose, "left"), kinematics.arm(pose, "right")
-        looked = self._torso.attention.fixated(now)
+        looked = self.moves.attention.fixated(now)
         return BodyState(
             pose=kinematics.pose_message(pose), gaze=kinematics.gaze(pose), left_arm=arms[0], right_arm=arms[1],
             moving=self._voice.is_busy or self._are_moving(tracks.LIMITS),
@@ -174,13 +176,11 @@ class MujocoBody(SimulatedBody):
 
     def seen(self) -> Seen | None:
         self.pulse.step()
-        return truth.seen(self._measured(), self.bench.physics.beside)
+        return seen_with(self._measured(), self.bench.physics.beside)
 
     def calibrate(self, offsets: Mapping[str, Radians]) -> None:
         super().calibrate(offsets)
-        self.pulse.step()
         self.bench.calibrate(offsets)
-        self.pulse.wake()
 
     # -- faults -------------------------------------------------------------------------------------------------
 
@@ -195,13 +195,12 @@ class MujocoBody(SimulatedBody):
         super().switch_faults([fault for fault in faults if fault.kind in SHARED])
         self._faults = tuple(ours)
         self.bench.suffer(ours)
-        self.pulse.wake()
 
     # -- steps --------------------------------------------------------------------------------------------------
 
     def _plan(self) -> dict[str, float]:
         """The planned angle of each joint now."""
-        return tracks.pose_at(self._torso.tracks, self._loop.time())
+        return tracks.pose_at(self.moves.tracks, self._loop.time())
 
     def _measured(self) -> dict[str, float]:
         """The measured angle of each joint; of the face, where it is shown."""
@@ -209,27 +208,24 @@ class MujocoBody(SimulatedBody):
 
     def _are_moving(self, parts: Iterable[str]) -> bool:
         """True if these parts move, by their plan or by what is measured."""
-        going = [self._torso.tracks[part] for part in parts]
+        going = [self.moves.tracks[part] for part in parts]
         now, quick = self._loop.time(), self.bench.physics.quick
         return any(track.is_moving(now) or not quick.isdisjoint(track.joints) for track in going)
 
-    def _compute(self, now: Seconds) -> bool:
-        return self.bench.advance(now, self._plan())
-
     def _look(self, now: Seconds) -> bool:
         """Look at what has come of a step. True: everything is at rest."""
-        for run in list(dict.fromkeys(self._torso.runs.values())):
+        for run in list(dict.fromkeys(self.moves.runs.values())):
             self._govern(run, now)
-        for gone in [run for run in self._watches if not self._torso.owns(run)]:
+        for gone in [run for run in self._watches if not self.moves.owns(run)]:
             del self._watches[gone]
-        is_planned = any(track.is_moving(now) for track in self._torso.tracks.values())
-        return not (is_planned or self._watches) and self.bench.is_at_rest(self._plan())
+        is_planned = any(track.is_moving(now) for track in self.moves.tracks.values())
+        return not (is_planned or self._watches) and self.bench.is_at_rest(now)
 
     # -- joints and plan ----------------------------------------------------------------------------------------
 
     def _govern(self, run: Run, now: Seconds) -> None:
         """Let the plan of a run wait while its joints lag, and go on when they have come along."""
-        off = self._off(run.course.parts, now, along.LAG)
+        off = self._off(run.course.parts, now, LAG)
         awaited = self._awaiting.get(run)
         watch = self._watches.get(run)
         if off is None or (awaited is None and off.share < (1.0 if watch is None else 0.5)):
@@ -244,7 +240,7 @@ class MujocoBody(SimulatedBody):
             self._stop(run, now)
         near = self._off_point(run, awaited, now) if awaited is not None else off
         watch.see(near, now)
-        if watch.stuck(now) is not None or (awaited is not None and near.share <= 1.0):
+        if watch.is_stuck or (awaited is not None and near.share <= 1.0):
             run.bell.ring()
 
     def _stop(self, run: Run, now: Seconds) -> None:
@@ -267,7 +263,7 @@ class MujocoBody(SimulatedBody):
             if self._awaiting.pop(run, None) is not None and run.gate < inf:
                 run.gate = inf
                 self._watches.pop(run, None)
-                self._torso.extend(run)
+                self.moves.extend(run)
             return max(due, now)
         self._awaiting[run] = point
         self.pulse.wake()
@@ -281,17 +277,15 @@ class MujocoBody(SimulatedBody):
 
     def check(self, run: Run) -> None:
         watch = self._watches.get(run)
-        if watch is None or watch.off is None or run.is_over:
-            return
-        if (waited := watch.stuck(self._loop.time())) is not None:
-            raise BodyFailed(self._stuck(run.behavior.id, watch.off, waited))
+        if watch is not None and watch.is_stuck and not run.is_over:
+            raise BodyFailed(self._stuck(run.behavior.id, watch))
 
-    def _off(self, parts: Iterable[str], now: Seconds, allowed: Mapping[str, float] = along.NEAR) -> Off | None:
+    def _off(self, parts: Iterable[str], now: Seconds, allowed: Mapping[str, float] = NEAR) -> Off | None:
         """The joint of these parts that is farthest off its plan; None: they have no motors."""
         joints, here, there, limits = [], [], [], []
         measured = self.bench.measured
         for part in parts:
-            track = self._torso.tracks[part]
+            track = self.moves.tracks[part]
             others = self._others(track, now)
             for joint, angle in zip(track.joints, track.angles(now), strict=True):
                 if joint in measured:
@@ -299,7 +293,7 @@ class MujocoBody(SimulatedBody):
                     here.append(measured[joint] - others.get(joint, 0.0))
                     there.append(angle)
                     limits.append(allowed[part])
-        return along.farthest(joints, here, there, limits) if joints else None
+        return farthest(joints, here, there, limits) if joints else None
 
     def _off_point(self, run: Run, point: WalkPoint, now: Seconds) -> Off:
         """Measure how far the joints of a run are off a sync point, or off the nearest place behind it.
@@ -307,7 +301,7 @@ class MujocoBody(SimulatedBody):
         A look that has waited and followed its target is to be where that has led it.
         """
         has_followed = run.holding and any(
-            self._torso.tracks[part].motion is not run.motion for part in run.course.parts
+            self.moves.tracks[part].motion is not run.motion for part in run.course.parts
         )
         if has_followed and (off := self._off(run.course.parts, now)) is not None:
             return off
@@ -330,7 +324,7 @@ class MujocoBody(SimulatedBody):
         limits: list[float] = []
         measured = self.bench.measured
         for part in run.course.parts:
-            track = self._torso.tracks[part]
+            track = self.moves.tracks[part]
             angles = q[column : column + len(track.joints)]
             column += len(track.joints)
             if track.aim is not None and not track.is_still(now, track.aim):
@@ -340,14 +334,14 @@ class MujocoBody(SimulatedBody):
                 joints.append(joint)
                 there.append(angle)
                 here.append(measured[joint] - others.get(joint, 0.0) if joint in measured else angle)
-                limits.append(along.NEAR[part])
-        return along.farthest(joints, here, there, limits)
+                limits.append(NEAR[part])
+        return farthest(joints, here, there, limits)
 
-    def _others(self, track: Track, now: Seconds) -> dict[str, float]:
+    def _others(self, track: PartTrack, now: Seconds) -> dict[str, float]:
         """Angles that the other track of the head adds to the joints of this one."""
-        if track.part not in ("head", "nod"):
+        if track.part != "head":
             return {}
-        other = self._torso.tracks["nod" if track.part == "head" else "head"]
+        other = self.moves.tracks["nod" if track.name == "head" else "head"]
         return dict(zip(other.joints, other.angles(now), strict=True))
 
     def _rests_on(self, looked: str) -> bool:
@@ -355,13 +349,11 @@ class MujocoBody(SimulatedBody):
         off = self._off(("head", "torso"), self._loop.time()) if looked else None
         return off is None or off.share < 2.0
 
-    def _stuck(self, where: str, off: Off, waited: Seconds) -> Fault:
+    def _stuck(self, where: str, watch: Watch) -> Fault:
         """Describe joints that do not come: which one, how far it is off, and what is known of its motor."""
-        here, there = math.degrees(off.here), math.degrees(off.there)
-        known = self.bench.suspicion(off.joint)
-        where_it_is = f"{off.joint} stands at {here:.1f} degrees, {abs(there - here):.1f} from where it should be"
-        reason = f"{where_it_is}, and has made no way for {waited:.1f} s"
-        return Fault(reason=f"{reason}: {known}" if known else reason, where=where, service="control")
+        fault = watch.fault(where)
+        known = self.bench.suspicion(watch.off.joint) if watch.off is not None else ""
+        return msgspec.structs.replace(fault, reason=f"{fault.reason}: {known}") if known else fault
 
 
 def _as_measured(limit: JointLimit) -> JointLimit:

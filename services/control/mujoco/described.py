@@ -12,24 +12,24 @@ import mujoco
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Pointing, Wait
-from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, Phase
+from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.bases.composed import ComposedBody
 from engage_hri.services.control.bases.members import Member
 from engage_hri.services.control.contract.body import Body, MovementAuthority, Progress
+from engage_hri.services.control.figure.estimates import wait_estimate
 from engage_hri.services.control.mujoco.description import ArmDescription, Description, read
 from engage_hri.services.control.mujoco.faults import OURS, refuse, told
-from engage_hri.services.control.mujoco.film import Frame, filmed
-from engage_hri.services.control.mujoco.filming import film_of, finish, framed
+from engage_hri.services.control.mujoco.film import Frame, filming, framed
 from engage_hri.services.control.mujoco.ik import Chain
 from engage_hri.services.control.mujoco.limbs import ArmLimb, HeadLimb, Limb
 from engage_hri.services.control.mujoco.motors import Motor
 from engage_hri.services.control.mujoco.physics import Physics
 from engage_hri.services.control.mujoco.robot import PREFIX, assembled
 from engage_hri.services.control.mujoco.settings import MujocoSettings
-from engage_hri.services.control.mujoco.stage import Stage, limits_of
+from engage_hri.services.control.mujoco.stage import DescribedStage, limits_of
 from engage_hri.services.control.voice import speaking
 from engage_hri.services.runtime.steps import Steps
 from engage_hri.services.tangram.table import tangram_table
@@ -53,8 +53,7 @@ class DescribedBody(ComposedBody):
         limits = {name: limits_of(name, part, ranges) for name, part in described.parts.items()}
         own = {limit.joint: limit for each in limits.values() for limit in each}
         physics = Physics(copy(model), motors, own, at=0.0, prefix=PREFIX, seed=self._settings.seed)
-        self.stage = Stage(described, physics, limits)
-        physics.time = self.stage.pulse.now()
+        self.stage = DescribedStage(described, physics, limits)
         self._limbs = _limbs(described, self.stage)
         super().__init__([Member(limb.part, limb, (limb.part,)) for limb in self._limbs])
         self.capabilities = _capabilities(described, self.stage, self.capabilities)
@@ -63,16 +62,9 @@ class DescribedBody(ComposedBody):
 
     @asynccontextmanager
     async def connected(self) -> AsyncIterator[None]:
-        """Film it meanwhile, if the settings ask for that; the film is drawn at the end."""
-        async with super().connected():
-            film = film_of(self.stage.physics.model, self._settings)
-            try:
-                async with filmed(film, self.frame):
-                    yield
-            finally:
-                self.stage.pulse.stop()
-                if film is not None:
-                    finish(film, self._settings)
+        film = filming(self.stage.physics.model, self._settings, self.frame, self.stage.pulse)
+        async with super().connected(), film:
+            yield
 
     def frame(self) -> Frame:
         """The robot as a film shows it now."""
@@ -83,10 +75,7 @@ class DescribedBody(ComposedBody):
 
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         if isinstance(behavior, Wait):
-            seconds = behavior.duration or 0.0
-            phase = Phase(since="start", to="end", shortest=seconds, natural=seconds, hold=True)
-            here = pose or self.state().pose
-            return Estimate(behavior=behavior.id, feasible=True, phases=(phase,), pose_after=here, pose_end=here)
+            return wait_estimate(behavior, behavior.duration or 0.0, pose or self.state().pose)
         return super().estimate(behavior, pose, world)
 
     def rehearse_in_steps(
@@ -144,7 +133,7 @@ def _shoulder(body: Body, target: tuple[float, float, float]) -> Seconds:
     return math.dist(body.axis(body.rest).origin, target)
 
 
-def _limbs(described: Description, stage: Stage) -> list[Limb]:
+def _limbs(described: Description, stage: DescribedStage) -> list[Limb]:
     """The parts that move on their own. Joints of a torso only hold."""
     model, found = stage.physics.model, list[Limb]()
     if (head := described.head) is not None:
@@ -159,7 +148,7 @@ def _limbs(described: Description, stage: Stage) -> list[Limb]:
     return found
 
 
-def _capabilities(described: Description, stage: Stage, of_parts: Capabilities) -> Capabilities:
+def _capabilities(described: Description, stage: DescribedStage, of_parts: Capabilities) -> Capabilities:
     joints = tuple(
         replace(
             limit, low=limit.low - SLACK, high=limit.high + SLACK, speed=MEASURED_SPEED * limit.speed,

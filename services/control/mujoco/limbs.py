@@ -26,7 +26,7 @@ from engage_hri.services.control.contract.body import (
 from engage_hri.services.control.contract.extras import Seen
 from engage_hri.services.control.figure.kinematics import HAND_TO_TARGET, TABLE_TOP
 from engage_hri.services.control.mujoco.ik import ON_AXIS, Chain, Solution
-from engage_hri.services.control.mujoco.stage import Angles, Stage
+from engage_hri.services.control.mujoco.stage import Angles, DescribedStage
 from engage_hri.services.runtime.steps import Steps, finished
 
 NODS: Mapping[str, tuple[Radians, Radians]] = {
@@ -61,7 +61,13 @@ class Limb(OrdinaryBody):
     acceleration = 0.5
 
     def __init__(
-        self, stage: Stage, part: str, joints: Sequence[JointLimit], chain: Chain, types: Sequence[str], name: str
+        self,
+        stage: DescribedStage,
+        part: str,
+        joints: Sequence[JointLimit],
+        chain: Chain,
+        types: Sequence[str],
+        name: str,
     ) -> None:
         self.part, self.joints, self.types, self.name = part, tuple(joints), tuple(types), name  # type: ignore[misc]
         self.rest = {limit.joint: stage.home[limit.joint] for limit in joints}  # type: ignore[misc]
@@ -114,7 +120,7 @@ class Limb(OrdinaryBody):
 
     def axis(self, angles: Angles) -> Ray:
         """The axis of eyes or forearm at these angles, all other joints as they are."""
-        return self.chain.ray(self.stage.qpos, angles)
+        return self.chain.ray(self.stage.physics.told(), angles)
 
     def prepare(self, behaviors: Sequence[BlockBehavior]) -> Awaitable[None] | None:
         """Solve what estimates and motions of these behaviors will ask for, a slice at a time."""

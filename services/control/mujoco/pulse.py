@@ -22,7 +22,7 @@ class Pulse:
         self, *, step: Callable[[Seconds], bool], rise: Callable[[Seconds], None], after: Callable[[Seconds], bool]
     ) -> None:
         self._loop = asyncio.get_running_loop()
-        self._compute, self._rise, self._after = step, rise, after
+        self._compute, self._rise, self.after = step, rise, after
         self._is_awake = False
         self._next: asyncio.TimerHandle | None = None
         self.on_step: Callable[[Seconds], None] = lambda at: None
@@ -56,7 +56,7 @@ class Pulse:
     def _tick(self) -> None:
         now = self.now()
         is_done = self.step()
-        self._is_awake = not self._after(now) or not is_done
+        self._is_awake = not self.after(now) or not is_done
         self.on_step(now)
         if self._is_awake:
             self._next = self._loop.call_at(now + TICK if is_done else now, self._tick)

@@ -1,74 +1,57 @@
-"""A described robot in its room, in motion: the plan of each part, the physics, and the state that pictures show."""
+"""Robots in their room, in motion: the plan, the physics that follows it, what is wrong, and what is measured."""
 
 import math
-from collections.abc import Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 
+import mujoco
 import numpy as np
 
 from engage_hri.schemas.body import JointLimit
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.units import Radians, Seconds
+from engage_hri.services.control.figure.kinematics import LIMIT
 from engage_hri.services.control.motion.motion import Motion
-from engage_hri.services.control.motion.path import Leg, Path, resting
-from engage_hri.services.control.mujoco import faults
+from engage_hri.services.control.motion.path import Leg, Path
+from engage_hri.services.control.motion.track import Place, Track
+from engage_hri.services.control.mujoco import faults, model
 from engage_hri.services.control.mujoco.description import Description, PartDescription
-from engage_hri.services.control.mujoco.physics import Array, Physics
+from engage_hri.services.control.mujoco.physics import Array, Contact, Physics
 from engage_hri.services.control.mujoco.pulse import Pulse
 from engage_hri.services.control.mujoco.room import Room
+from engage_hri.services.tangram.table import tangram_table
 
 Angles = Mapping[str, Radians]
 
 
-class Stage:
-    """Physics on loop time, and a planned motion for each part. measured: joint angles as the encoders tell them."""
+class Stage(ABC):
+    """A robot in its room, on loop time. measured: joint angles as the encoders tell them.
 
-    def __init__(
-        self, described: Description, physics: Physics, limits: Mapping[str, tuple[JointLimit, ...]]
-    ) -> None:
-        """physics: of the described robot. limits: of the joints of each part."""
-        self.physics = physics
+    parts: that of each joint.
+    """
+
+    def __init__(self, physics: Physics, parts: Mapping[str, str], home: Angles) -> None:
+        """home: where the joints are placed."""
+        self.physics, self.parts = physics, parts
         self.room = Room(physics)
-        self.limits = limits
-        self.parts = {joint: part for part, joints in limits.items() for joint in (limit.joint for limit in joints)}
-        self.home = {joint: math.radians(described.home.get(joint, 0.0)) for joint in physics.joints}
-        physics.place(self.home)
-        self.safe_qpos = physics.data.qpos.copy()
-        """The model in the safe pose."""
-        self.measured: dict[str, Radians] = dict(self.home)
-        self.pulse = Pulse(step=self._step, rise=physics.skip, after=self._is_at_rest)
-        self._motions = {
-            part: Motion(Path(resting([self.home[limit.joint] for limit in own]), (), own), 0.0)
-            for part, own in limits.items()
-        }
+        physics.place({joint: home[joint] for joint in physics.joints})
+        self.pulse = Pulse(step=self._step, rise=physics.skip, after=self.is_at_rest)
+        physics.time = self.pulse.now()
+        self._measure()
 
-    def go(self, part: str, goal: Angles, seconds: Seconds) -> None:
-        """Plan a motion of a part to a goal, from where its plan is now and as fast as that moves."""
-        own, now = self.limits[part], self.pulse.now()
-        leg = Leg(goal=tuple(goal[limit.joint] for limit in own), seconds=seconds)
-        self._motions[part] = Motion(Path(self._motions[part].at(now), (leg,), own), now)
-        self.pulse.wake()
+    @abstractmethod
+    def plan(self, now: Seconds) -> Angles:
+        """Tell where the servos are to be."""
 
-    def planned(self, part: str, now: Seconds) -> dict[str, Radians]:
-        """The planned angles of a part."""
-        angles = self._motions[part].position(now).tolist()
-        return {limit.joint: angle for limit, angle in zip(self.limits[part], angles, strict=True)}
+    @abstractmethod
+    def touched(self, joint: str) -> Sequence[Contact]:
+        """List what that moves with a joint is in contact with."""
 
-    def is_moving(self, part: str) -> bool:
-        """True if a part moves, by its plan or by what is measured."""
-        joints = {limit.joint for limit in self.limits[part]}
-        return self.pulse.now() < self._motions[part].end or not joints.isdisjoint(self.physics.quick)
+    def is_at_rest(self, now: Seconds) -> bool:
+        """True if nothing moves, and the plan does not, either."""
+        return self.physics.is_at_rest(self._reference(now))
 
-    def angles(self, part: str) -> dict[str, Radians]:
-        """The measured angles of a part, now."""
-        self.pulse.step()
-        return {limit.joint: self.measured[limit.joint] for limit in self.limits[part]}
-
-    @property
-    def qpos(self) -> Array:
-        """The model as the encoders tell it."""
-        return self.physics.told()
-
-    def calibrate(self, offsets: Mapping[str, Radians]) -> None:
+    def calibrate(self, offsets: Angles) -> None:
         """Correct what these encoders tell by what a true angle is more."""
         self.pulse.step()
         self.physics.calibrate(offsets)
@@ -85,15 +68,11 @@ class Stage:
 
     def suspicion(self, joint: str) -> str:
         """Tell what a joint that does not come has against it, as far as motor and contacts say."""
-        touched = [each.thing for each in self.physics.contacts() if self.parts.get(joint, "").endswith("_arm")]
-        return "; ".join(
-            (*self.physics.complaints(joint), *(f"it is in contact with {thing}" for thing in touched[:1]))
-        )
+        touched = [f"it is in contact with {each.thing}" for each in self.touched(joint)]
+        return "; ".join((*self.physics.complaints(joint), *touched[:1]))
 
     def _reference(self, now: Seconds) -> Array:
-        plan: dict[str, Radians] = {}
-        for part in self._motions:
-            plan.update(self.planned(part, now))
+        plan = self.plan(now)
         return np.array([plan[joint] for joint in self.physics.joints])
 
     def _step(self, now: Seconds) -> bool:
@@ -104,9 +83,83 @@ class Stage:
     def _measure(self) -> None:
         self.measured = dict(zip(self.physics.joints, self.physics.measured.tolist(), strict=True))
 
-    def _is_at_rest(self, now: Seconds) -> bool:
-        is_planned = any(now < motion.end for motion in self._motions.values())
-        return not is_planned and self.physics.is_at_rest(self._reference(now))
+
+class Workbench(Stage):
+    """The torso at its table."""
+
+    def __init__(self, plan: Callable[[Seconds], Angles], after: Callable[[Seconds], bool], seed: int = 0) -> None:
+        """plan: where each joint is to be at an instant. after: as of `Pulse`."""
+        self.model = mujoco.MjModel.from_xml_string(model.scene(tangram_table()))
+        self._plan = plan
+        physics = Physics(self.model, model.MOTORS, LIMIT, at=0.0, seed=seed)
+        super().__init__(physics, {joint: LIMIT[joint].part for joint in model.MOTORS}, plan(0.0))
+        self.pulse.after = after
+
+    def plan(self, now: Seconds) -> Angles:
+        return self._plan(now)
+
+    def touched(self, joint: str) -> Sequence[Contact]:
+        parts = {"left": "left_forearm", "right": "right_forearm", "neck": "nose", "torso": "belly"}
+        own = parts.get(joint.partition("_")[0])
+        return [each for each in self.physics.contacts() if each.robot == own]
+
+    def calibrate(self, offsets: Angles) -> None:
+        super().calibrate({joint: offsets.get(joint, 0.0) for joint in self.physics.joints})
+
+    def suffer(self, on: Sequence[BodyFault]) -> None:
+        super().suffer(on)
+        for box, place in faults.obstacles(on).items():
+            self.physics.put(box, place)
+        by = faults.table_rise(on)
+        if abs(by - self.room.rise) > 1e-9:  # the table is higher, with what lies on it, than the body believes
+            x, y, top = tangram_table().surface.center
+            self.physics.put("high table", (x, y, top + by - model.BOARD if by else model.AWAY))
+            self.room.lift(by)
+
+
+class DescribedStage(Stage):
+    """A described robot, with a planned motion for each part."""
+
+    def __init__(
+        self, described: Description, physics: Physics, limits: Mapping[str, tuple[JointLimit, ...]]
+    ) -> None:
+        """physics: of the described robot. limits: of the joints of each part."""
+        self.limits = limits
+        self.home = {joint: math.radians(described.home.get(joint, 0.0)) for joint in physics.joints}
+        self._tracks = {
+            part: Track[Place](part, own, tuple(self.home[limit.joint] for limit in own))
+            for part, own in limits.items()
+        }
+        super().__init__(physics, {each.joint: part for part, own in limits.items() for each in own}, self.home)
+        self.safe_qpos = physics.data.qpos.copy()
+        """The model in the safe pose."""
+
+    def go(self, part: str, goal: Angles, seconds: Seconds) -> None:
+        """Plan a motion of a part to a goal, from where its plan is now and as fast as that moves."""
+        track, now = self._tracks[part], self.pulse.now()
+        leg = Leg(goal=tuple(goal[joint] for joint in track.joints), seconds=seconds)
+        track.play(Motion(Path(track.at(now), (leg,), track.own_limits), now))
+        self.pulse.wake()
+
+    def plan(self, now: Seconds) -> Angles:
+        tracks = self._tracks.values()
+        return {joint: at for each in tracks for joint, at in zip(each.joints, each.angles(now), strict=True)}
+
+    def is_moving(self, part: str) -> bool:
+        """True if a part moves, by its plan or by what is measured."""
+        track = self._tracks[part]
+        return track.is_moving(self.pulse.now()) or not self.physics.quick.isdisjoint(track.joints)
+
+    def angles(self, part: str) -> dict[str, Radians]:
+        """The measured angles of a part, now."""
+        self.pulse.step()
+        return {joint: self.measured[joint] for joint in self._tracks[part].joints}
+
+    def touched(self, joint: str) -> Sequence[Contact]:
+        return self.physics.contacts() if self.parts.get(joint, "").endswith("_arm") else ()
+
+    def is_at_rest(self, now: Seconds) -> bool:
+        return not any(track.is_moving(now) for track in self._tracks.values()) and super().is_at_rest(now)
 
 
 def limits_of(

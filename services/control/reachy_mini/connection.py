@@ -1,10 +1,11 @@
 """The daemon of a Reachy Mini over HTTP and WebSockets: a thin shell, with `aiohttp`."""
 
 import asyncio
-import json
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
+
+import msgspec
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
@@ -21,8 +22,8 @@ except ImportError as error:  # pragma: no cover - where the extra is not instal
 
 RATE = 50
 """Measurements per second that are asked for: as often as the daemon reads the motors."""
-STATE = f"/api/state/ws/full?frequency={RATE}"
-TARGET = "/api/move/ws/set_target"
+STATE = f"api/state/ws/full?frequency={RATE}"
+TARGET = "api/move/ws/set_target"
 PATIENCE: Seconds = 2.0
 """Seconds for one answer."""
 GREETING: Seconds = 15.0
@@ -41,8 +42,8 @@ async def connected(settings: ReachyMiniSettings) -> AsyncIterator[Daemon]:
             await _be_ready(session, settings)
             closing = aiohttp.ClientWSTimeout(ws_close=0.2)
             async with (
-                _opened(session, STATE, closing) as state,
-                _opened(session, TARGET, closing) as targets,
+                session.ws_connect(STATE, timeout=closing) as state,
+                session.ws_connect(TARGET, timeout=closing, max_msg_size=1 << 20) as targets,
             ):
                 connection = _Connection(settings.url, state, targets)
                 listening = asyncio.create_task(connection.listen(), name="answers of reachy mini")
@@ -102,18 +103,6 @@ def _unreachable(url: str, error: BaseException) -> Fault:
     return Fault(reason=f"the daemon at {url} cannot be reached: {words}", advice=_ADVICE)
 
 
-@asynccontextmanager
-async def _opened(
-    session: aiohttp.ClientSession, path: str, closing: aiohttp.ClientWSTimeout
-) -> AsyncIterator[aiohttp.ClientWebSocketResponse]:
-    async with asyncio.timeout(PATIENCE):
-        socket = await session.ws_connect(path.lstrip("/"), timeout=closing, max_msg_size=1 << 20)
-    try:
-        yield socket
-    finally:
-        await socket.close()
-
-
 async def _be_ready(session: aiohttp.ClientSession, settings: ReachyMiniSettings) -> None:
     status = await _asked(session, "GET", "api/daemon/status")
     state, backend = status.get("state"), status.get("backend_status") or {}
@@ -135,9 +124,6 @@ async def _asked(session: aiohttp.ClientSession, method: str, path: str, body: o
     if answer.status >= 400:
         raise Lost(Fault(reason=f"the daemon refuses {path}: {answer.status} {text[:100]}", advice=VERSION))
     try:
-        told = json.loads(text)
-    except ValueError:
-        told = None
-    if not isinstance(told, dict):
-        raise Lost(Fault(reason=f"the daemon answers {path} with {text[:60]!r}", advice=VERSION))
-    return told
+        return msgspec.json.decode(text, type=dict)
+    except msgspec.MsgspecError as error:
+        raise Lost(Fault(reason=f"the daemon answers {path} with {text[:60]!r}", advice=VERSION)) from error

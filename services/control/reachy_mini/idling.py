@@ -13,7 +13,7 @@ from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.services.control.contract.extras import Gate
 from engage_hri.services.control.figure.alive import BREATH
 from engage_hri.services.control.reachy_mini import joints
-from engage_hri.services.control.reachy_mini.geometry import Angles
+from engage_hri.services.control.reachy_mini.joints import Angles
 
 LEAN: Radians = radians(0.5)
 """Amplitude of the breath: 1.5 mm of the head, which looks on where it looks."""
@@ -69,27 +69,19 @@ class Idling:
     def off(self, pose: dict[str, Radians], now: Seconds) -> dict[str, Radians]:
         """Take it off what is measured now. A reading that comes again is old, and as it was."""
         if pose != self._read:
-            self._read, self.shown = pose, self._measured(now)
-        return {**pose, **{joint: pose[joint] - by for joint, by in self.shown.items()}} if self.shown else pose
+            self._read, self.shown = pose, self._measured(now - self._lag)
+        return {joint: angle - self.shown.get(joint, 0.0) for joint, angle in pose.items()}
 
-    def _measured(self, now: Seconds) -> dict[str, Radians]:
-        """Tell what of it is in what is measured now: joints go evenly from one target to the next."""
-        at = now - self._lag
+    def _measured(self, at: Seconds) -> dict[str, Radians]:
+        """Tell what of it joints show by then: they go evenly from one target to the next."""
         while len(self._sent) > 1 and self._sent[1][0] <= at:
             self._sent.popleft()
         (since, before), (until, after) = self._sent[0], self._sent[min(1, len(self._sent) - 1)]
         share = (at - since) / (until - since) if since < at < until < since + LONGEST else 0.0
-        if not share:
-            return before
         return {
             joint: (1.0 - share) * before.get(joint, 0.0) + share * after.get(joint, 0.0)
-            for joint in {**before, **after}
+            for joint in (*before, *(after if share else ()))
         }
-
-
-def together(pose: dict[str, Radians], added: Angles) -> dict[str, Radians]:
-    """Add idle motion to a pose that is to be sent."""
-    return {**pose, **{joint: pose[joint] + by for joint, by in added.items()}} if added else pose
 
 
 def _within(joint: str, planned: Radians, by: Radians) -> Radians:

@@ -9,7 +9,7 @@ import math
 import msgspec
 from msgspec import Struct
 
-from engage_hri.services.control.reachy_mini.geometry import Angles, head_place, lean
+from engage_hri.services.control.reachy_mini.joints import Angles, head_place, lean
 
 ENABLED = "enabled"
 FARTHEST_ASIDE = math.radians(100.0)

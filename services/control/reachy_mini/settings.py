@@ -1,8 +1,9 @@
 """Settings of the driver of Reachy Mini: the section `control.drivers.reachy_mini`."""
 
+from typing import Annotated
 from urllib.parse import urlsplit
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from engage_hri.schemas.units import Degrees, Seconds, Vector
 
@@ -23,24 +24,16 @@ class ReachyMiniSettings(Struct, frozen=True, kw_only=True, forbid_unknown_field
 
     url: str = "http://127.0.0.1:8000"
     position: Vector = (0.0, 0.0, 0.73)
-    facing: Degrees = 0.0
-    pace: float = 1.0
-    on_target: Degrees = 0.8
-    correction: Degrees = 4.0
-    lag: Seconds = 0.08
-    patience: Seconds = 1.5
-    silence: Seconds = 1.0
+    facing: Annotated[Degrees, Meta(ge=-180, le=180)] = 0.0
+    pace: Annotated[float, Meta(ge=0.1, le=1)] = 1.0
+    on_target: Annotated[Degrees, Meta(ge=0.1, le=5)] = 0.8
+    correction: Annotated[Degrees, Meta(ge=0, le=10)] = 4.0
+    lag: Annotated[Seconds, Meta(ge=0, le=1)] = 0.08
+    patience: Annotated[Seconds, Meta(ge=0.2, le=60)] = 1.5
+    silence: Annotated[Seconds, Meta(ge=0.2, le=60)] = 1.0
     enable_motors: bool = True
 
     def __post_init__(self) -> None:
         parts = urlsplit(self.url)
         if parts.scheme not in ("http", "https") or not parts.hostname:
             raise ValueError(f"url is {self.url!r}: expected such as http://reachy-mini.local:8000")
-        ranges = {
-            "pace": (0.1, 1.0), "on_target": (0.1, 5.0), "correction": (0.0, 10.0), "lag": (0.0, 1.0),
-            "patience": (0.2, 60.0),
-            "silence": (0.2, 60.0), "facing": (-180.0, 180.0),
-        }  # fmt: skip
-        for name, (least, most) in ranges.items():
-            if not least <= (value := getattr(self, name)) <= most:
-                raise ValueError(f"{name} is {value}: expected {least:g} to {most:g}")

@@ -1,19 +1,56 @@
 """Check of what a body tells of a behavior, as it tells it: drivers are programs of others. Pure.
 
-Bodies are held to all of the contract by `testing`; here is what would make a message untrue by itself.
+Bodies are held to all of the contract by `testing`; here is what would make a message untrue by itself. `sound` makes
+values of what a driver tells, so that they can be noted; `Told` compares them with what was told before.
 """
 
 from collections.abc import Sequence
 from math import isfinite
+from typing import Any
 
 from engage_hri.schemas.behavior_types import TYPES, sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Head, Speech
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.body import Arrived, MovementAuthority, Progress, Reached, Spoke
+from engage_hri.services.control.serving.steps import Nonsense
 
 SKEW: Seconds = 0.25
 """What a body tells may be this much older than its behavior, or this much ahead: a robot has a clock of its own."""
+
+
+def sound(told: object) -> Progress | Nonsense:
+    """Pass on what a driver tells: the same, with each field of its type, or why that cannot be."""
+    try:
+        match told:
+            case Reached(sync=sync, at=at, arrived=arrived):
+                return Reached(_name(sync), _time(sync, at), _time(sync, arrived))
+            case Arrived(sync=sync, at=at):
+                return Arrived(_name(sync), _time(sync, at))
+            case Spoke(word=word, position=position, at=at):
+                return Spoke(str(word), _position(position), _time("a word", at))
+    except ValueError as error:
+        return Nonsense(str(error))
+    return Nonsense(f"a {type(told).__name__}, which is no progress")
+
+
+def _name(sync: object) -> str:
+    if not isinstance(sync, str):
+        raise ValueError(f"{sync!r}, which is no name of a sync point")
+    return sync
+
+
+def _time(what: str, at: object) -> Seconds:
+    if isinstance(at, bool) or not isinstance(at, int | float) or not isfinite(at):
+        raise ValueError(f"{what!r} at {at!r}, which is no time of the loop")
+    return float(at)
+
+
+def _position(position: Any) -> int:
+    try:
+        return int(position)  # a driver's number, of whatever type
+    except (TypeError, ValueError):
+        raise ValueError(f"a word that ends at {position!r}, which is no number of characters") from None
 
 
 class Told:
@@ -48,7 +85,6 @@ class Told:
                 return self._untimely(sync, now, at) or self._unpassed(sync)
             case Spoke(position=position, at=at):
                 return self._untimely("a word", now, at) or self._says(position)
-        return f"a {type(progress).__name__}, which is no progress"
 
     def missing(self) -> str:
         """Say what is missing now that the body has ended the behavior; empty: nothing."""
@@ -59,8 +95,6 @@ class Told:
 
     def _untimely(self, what: str, now: Seconds, *times: Seconds) -> str:
         for at in times:
-            if isinstance(at, bool) or not isinstance(at, int | float) or not isfinite(at):
-                return f"{what!r} at {at!r}, which is no time of the loop"
             if at > now + SKEW:
                 return f"{what!r} {at - now:.3f} s before it is"
             if at < self._began - SKEW:
@@ -99,11 +133,7 @@ class Told:
         return ""
 
     def _says(self, position: int) -> str:
-        before = self._said
-        try:
-            self._said = int(position)  # a driver's number, of whatever type
-        except (TypeError, ValueError):
-            return f"a word that ends at {position!r}, which is no number of characters"
+        before, self._said = self._said, position
         if not before <= self._said <= self._length:
             return f"a word that ends at {self._said} of {self._length} characters after one that ended at {before}"
         return ""

@@ -1,13 +1,12 @@
 """Answers of the control service to questions about its body: what behaviors would take, and what it can do."""
 
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import Awaitable, Coroutine
 from typing import Any
 
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import BlockBehavior
-from engage_hri.schemas.body import DescribeBody, Estimate, EstimateBehaviors, Estimates
+from engage_hri.schemas.body import DescribeBody, EstimateBehaviors, Estimates
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.world import World
@@ -15,8 +14,8 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.contract.calibration import Calibration
-from engage_hri.services.control.contract.refusals import refusal
 from engage_hri.services.control.serving.estimates import IncomingEstimates
+from engage_hri.services.control.serving.intake import ControlIntake
 from engage_hri.services.control.serving.words_for_voice import estimate_of, spoken, spoken_items
 from engage_hri.services.runtime.steps import Steps
 from engage_hri.services.runtime.unhurried import InTurns
@@ -26,10 +25,10 @@ class Questions:
     """Answers about a body. Nothing of it moves."""
 
     def __init__(
-        self, bus: Bus, config: ControlConfig, body: Body, calibration: Calibration, world: Callable[[], World]
+        self, bus: Bus, config: ControlConfig, body: Body, calibration: Calibration, intake: ControlIntake
     ) -> None:
-        """calibration: says how far what is estimated may be beside. world: tells the world as it is known now."""
-        self._config, self._body, self._calibration, self._world = config, body, calibration, world
+        """calibration: says how far what is estimated may be beside. intake: knows the world as it is now."""
+        self._config, self._body, self._calibration, self._intake = config, body, calibration, intake
         self._estimates = IncomingEstimates(bus)
         self._rehearsals = InTurns()
 
@@ -40,25 +39,21 @@ class Questions:
         preparing = self._body.prepare([spoken(item.behavior) for item in question.items])
         if preparing is not None:
             return self._prepared(preparing, question)
-        return self._rehearsals.answer(self._estimated(question, self._world()))
+        return self._rehearsals.answer(self._estimated(question, self._intake.world))
 
     async def _prepared(self, preparing: Awaitable[None], question: EstimateBehaviors) -> Message:
         await preparing
-        answer = self._rehearsals.answer(self._estimated(question, self._world()))
+        answer = self._rehearsals.answer(self._estimated(question, self._intake.world))
         return await answer if isinstance(answer, Coroutine) else answer
 
     def _estimated(self, question: EstimateBehaviors, world: World) -> Steps[Message]:
-        refused = [self.refused(item.behavior) for item in question.items]
+        refused = [self._intake.refused(item.behavior) for item in question.items]
         known = [item for item, refusal in zip(question.items, refused, strict=True) if refusal is None]
-        others = [item for item in question.others if self.refused(item.behavior) is None]
+        others = [item for item in question.others if self._intake.refused(item.behavior) is None]
         told = yield from self._body.rehearse_in_steps(spoken_items(known), world, spoken_items(others))
         taken = zip(known, self._estimates.take(known, told), strict=True)
         estimates = iter([self._calibration.stated(estimate_of(item.behavior, each)) for item, each in taken])
         return Estimates(items=tuple([next(estimates) if refusal is None else refusal for refusal in refused]))
-
-    def refused(self, behavior: BlockBehavior) -> Estimate | None:
-        """The estimate of a behavior that the body is not asked about; None: it is to be asked."""
-        return refusal(behavior, self._body.capabilities, self._config.no_point_zones, self._world())
 
     def describe(self, question: Message) -> Message:
         """Answer `DescribeBody` with what the body can do. Raises InputRefused."""

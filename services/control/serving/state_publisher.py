@@ -1,19 +1,17 @@
-"""Publisher of what the body shows as it moves: its state, and what its eyes rest on."""
+"""Publisher of what the body shows as it moves: its state. It decides how often it looks, and nothing else."""
 
+from collections.abc import Callable
 from math import inf
 
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import OngoingActions
 from engage_hri.schemas.body import BodyPose, JointAngle, RobotSeen, RobotState
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.contract.calibration import Calibration
 from engage_hri.services.control.contract.extras import Idle, Seen
-from engage_hri.services.control.serving.actions import ActionMessage, ActionReporter
-from engage_hri.services.reports.ongoing_actions import OngoingActionTracker
 from engage_hri.services.runtime.alarm import Timer
 
 IDLE: Seconds = 1.0
@@ -30,14 +28,21 @@ class Shown:
     """
 
     def __init__(
-        self, bus: Bus, body: Body, actions: ActionReporter, rate: float, calibration: Calibration | None = None
+        self,
+        bus: Bus,
+        body: Body,
+        rate: float,
+        on_look: Callable[[str], None],
+        calibration: Calibration | None = None,
     ) -> None:
-        """rate: looks a second while anything moves. calibration: says how far what is measured may be beside."""
+        """rate: looks a second while anything moves. on_look: told at each of them what the eyes rest on.
+
+        calibration: says how far what is measured may be beside.
+        """
         self._calibration = calibration or Calibration()
         self._bus = bus
         self._body = body
-        self._actions = actions
-        self._ongoing = OngoingActionTracker()
+        self._on_look = on_look
         self._interval = 1.0 / rate
         self._next = Timer(self.look)
         self._looked: Seconds = -inf
@@ -55,7 +60,7 @@ class Shown:
     def _look(self) -> None:
         now, state = self._bus.now(), self._body.state()
         self._looked = now
-        self.tell(self._actions.looks_at(state.looking_at, "", now))
+        self._on_look(state.looking_at)
         widened = self._calibration.widened
         message = RobotState(
             at=self._bus.stamp(now), pose=state.pose, gaze=widened(state.gaze, "head"),
@@ -104,24 +109,6 @@ class Shown:
         due = self._looked + self._interval
         if self._next.at is None or self._next.at > due:
             self._next.set(due)
-
-    def note_look(self, label: str, at: Seconds | None = None) -> None:
-        """Publish what the eyes rest on, if that has changed. label: `block:behavior` that moved them, if known."""
-        with self._bus.containing("what the body looks at"):
-            entity = self._body.state().looking_at
-            self.tell(self._actions.looks_at(entity, label, self._bus.now() if at is None else at))
-
-    def tell(self, actions: list[ActionMessage]) -> None:
-        """Publish actions of the robot, and what goes on after them."""
-        for action in actions:
-            self._bus.publish(keys.ROBOT_ACTION, action)
-        for state in self._ongoing.feed(actions, self._bus.stamp()):
-            self._bus.publish(keys.ROBOT_ONGOING, state)
-
-    def begin(self) -> None:
-        """Publish that the robot does nothing yet, and look for the first time."""
-        self._bus.publish(keys.ROBOT_ONGOING, OngoingActions(actor=self._bus.robot, at=self._bus.stamp()))
-        self.look()
 
     def close(self) -> None:
         """Look no more."""

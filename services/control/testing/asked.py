@@ -25,7 +25,8 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.world import Entity, World
 
-Aimed = Gaze | GazeShift | HeadDirectionShift | Pointing
+LOOKS = Gaze | GazeShift | HeadDirectionShift
+AIMED = LOOKS | Pointing
 WORLD = World(
     entities=(
         Entity(id="human", kind="person", position=(1.3, 0.0, 1.2)),
@@ -61,7 +62,7 @@ def behaviors_in(world: World) -> tuple[BlockBehavior, ...]:
     ids = [entity.id for entity in (*world.objects, *world.people, *world.entities)]
     last = ids[max(1, len(world.objects) - 1) % len(ids)]
     places = {"near-right": ids[0], "far-left": last}
-    return tuple(replace(each, target=places[each.target]) if isinstance(each, Aimed) else each for each in BEHAVIORS)
+    return tuple(replace(each, target=places[each.target]) if isinstance(each, AIMED) else each for each in BEHAVIORS)
 
 
 HOLDS = {name: row.holds for name, row in TYPES.items() if row.holds}

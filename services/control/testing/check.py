@@ -22,16 +22,15 @@ from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.testing.asked import BEHAVIORS, WORLD, behaviors_in
-from engage_hri.services.control.testing.cases import findings_of
-from engage_hri.services.control.testing.causes import told_once
 from engage_hri.services.control.testing.contract import BodyContract
+from engage_hri.services.control.testing.findings import findings_of
 from engage_hri.services.control.testing.first import FirstLook, look
 from engage_hri.services.control.testing.laws import Finding, named
 from engage_hri.services.control.testing.motions import unused
 from engage_hri.services.control.testing.playing import playable, played
 from engage_hri.services.control.testing.plugin import virtual_loop
 from engage_hri.services.control.testing.render import Printed
-from engage_hri.services.control.testing.report import BodyReport, CheckedLaw, Stated, verdict
+from engage_hri.services.control.testing.report import BodyReport, CheckedLaw, Stated, told_once
 from engage_hri.services.control.testing.suite import PLUGIN, Suite, unchecked
 from engage_hri.services.runtime.virtual_time import Deadlock, TimeRanOut
 
@@ -169,7 +168,8 @@ class _Tried:
         """Judge the law by them. name: of the law, in words."""
         return CheckedLaw(
             law=name, topic=self.topic, says=self.says, usually=self.usually, trials=self.trials,
-            verdict=verdict(self.findings, self.passed), findings=tuple(self.findings), reasons=tuple(self.reasons),
+            verdict="broken" if self.findings else "holds" if self.passed else "does not apply",
+            findings=tuple(self.findings), reasons=tuple(self.reasons),
             seconds=self.seconds,
         )  # fmt: skip
 

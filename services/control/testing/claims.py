@@ -3,25 +3,23 @@
 import asyncio
 import math
 from collections.abc import Sequence
+from functools import partial
 
-from msgspec.structs import replace
-
-from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift, Pointing
+from engage_hri.schemas.behaviors import BlockBehavior, Pointing
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, Phase, PlannedTime, Ray
 from engage_hri.schemas.units import Degrees, Meters, Radians, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.contract.body import Arrived, Body, BodyState, Progress, Reached
-from engage_hri.services.control.testing.laws import angles, broken, degrees, listed, ms
+from engage_hri.services.control.testing.asked import AIMED
+from engage_hri.services.control.testing.laws import angle, angles, aside, broken, degrees, listed, ms
 from engage_hri.services.control.testing.motions import recorded
 from engage_hri.services.control.testing.predictions import has_joints
-from engage_hri.services.control.testing.rays import angle, aside
 from engage_hri.services.control.testing.stage import PATIENCE, Stage, done, target_point, times
-from engage_hri.services.control.testing.suite import Suite, does_not_apply, pose_angles
+from engage_hri.services.control.testing.suite import Suite, by_each, does_not_apply, pose_angles
 from engage_hri.services.control.testing.witness import arms
 from engage_hri.services.runtime.steps import finished
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 
-AIMED = Gaze | GazeShift | HeadDirectionShift | Pointing
 ORIGIN = 0.05
 """Metres by which eyes or an elbow may be elsewhere than the ray of an estimate begins."""
 WIDEST_CYLINDER, WIDEST_CONE = 0.2, math.radians(20.0)
@@ -47,34 +45,34 @@ class ClaimLaws(Suite):
 
     topic = "claims"
 
-    async def test_is_along_the_ray_that_it_said(self, body: Body) -> None:
+    @by_each(AIMED, "nothing with a target")
+    async def test_is_along_the_ray_that_it_said(self, body: Body, behavior: BlockBehavior) -> None:
         """Eyes and forearms are along the `ray` of the estimate once they are on target, within `accuracy`.
 
         Usually the ray is the one of the pose at the start, or its axis points the other way, from the target to the
         eyes. Generation counts by it what else a look or pointing may be taken for.
         """
-        for case in self.cases(body, lambda each: isinstance(each, AIMED), "nothing with a target"):
-            async with case as behavior:
-                said, stage = body.estimate(behavior, None, self.world).ray, _OnTarget(self, body, behavior)
-                await stage.over()
-                assert stage.state is not None
-                self._check_ray(behavior, said, [ray for ray in _rays(stage.state, behavior) if ray is not None])
-
-    def _check_ray(self, behavior: BlockBehavior, said: Ray | None, seen: Sequence[Ray]) -> None:
-        sync = target_point(behavior)
-        if not seen:
+        said, sync = body.estimate(behavior, None, self.world).ray, target_point(behavior)
+        if not (seen := await self._on_target(body, behavior)):
             return
         if said is None:
-            broken(behavior, sync, expected="the `ray` on target in its estimate", measured="None")
+            broken(sync, expected="the `ray` on target in its estimate", measured="None")
         near = (3.0 if isinstance(behavior, Pointing) else 1.0) * self.accuracy + self.gaze_slack + said.error
         off, away = min((angle(said.axis, ray.axis), math.dist(said.origin, ray.origin)) for ray in seen)
         if off > near or away > ORIGIN + self.gaze_slack:
             broken(
-                behavior,
                 sync,
                 expected=f"what the estimate says, within {degrees(near)} and {ORIGIN * 100:.0f} cm",
                 measured=f"{degrees(off)} and {away * 100:.1f} cm beside it",
             )
+
+    async def _on_target(self, body: Body, behavior: BlockBehavior) -> list[Ray]:
+        """Perform a behavior, and see where its eyes or forearms are as it tells that it is on target."""
+        stage = _OnTarget(self, body, behavior)
+        await stage.over()
+        assert stage.state is not None
+        rays = arms(stage.state, behavior.mode) if isinstance(behavior, Pointing) else (stage.state.gaze,)
+        return [ray for ray in rays if ray is not None]
 
     async def test_states_what_people_can_tell_apart(self, body: Body) -> None:
         """`pointing_radius` and `gaze_half_angle` are such that people can tell things on a table apart.
@@ -88,9 +86,8 @@ class ClaimLaws(Suite):
             limit = f"a `pointing_radius` up to {WIDEST_CYLINDER * 100:.0f} cm"
             broken(expected=limit, measured=f"{able.pointing_radius * 100:.0f} cm")
         if not 0.0 < able.gaze_half_angle <= WIDEST_CONE:
-            broken(
-                expected=f"a `gaze_half_angle` up to {degrees(WIDEST_CONE)}", measured=degrees(able.gaze_half_angle)
-            )
+            limit = f"a `gaze_half_angle` up to {degrees(WIDEST_CONE)}"
+            broken(expected=limit, measured=degrees(able.gaze_half_angle))
 
     async def test_points_as_far_as_its_reach_and_no_farther(self, body: Body) -> None:
         """A body points at a thing somewhat within its `reach`, and refuses one as much beyond it.
@@ -103,79 +100,65 @@ class ClaimLaws(Suite):
             broken(expected="no `reach` where it does not point", measured=f"{reach:g} m")
         if not reach:
             does_not_apply("it states no `reach`")
-        for case in self.cases(body, lambda each: isinstance(each, Pointing), "no pointing"):
-            async with case as behavior:
-                assert isinstance(behavior, Pointing)
-                ray = body.estimate(behavior, None, self.world).ray
-                if ray is None:
-                    continue  # another law says so
-                slack = max(UNSURE, UPPER_ARM * math.dist(ray.origin, ray.tip or ray.origin))
-                within, beyond = (self._along(behavior, ray, reach + by) for by in (-slack, slack))
-                await self._check_points(body, behavior, within, f"that it points {reach - slack:.2f} m far")
-                body.see(beyond)
-                if body.estimate(behavior, None, beyond).feasible:
-                    limit = f"a refusal of what is {reach + slack:.2f} m away, since its `reach` is {reach:.2f} m"
-                    broken(behavior, expected=limit, measured="it is feasible")
-                body.see(self.world)
+        await self.judge(body, partial(self._check_reach, body, reach), Pointing, "no pointing")
+
+    async def _check_reach(self, body: Body, reach: Meters, behavior: BlockBehavior) -> None:
+        assert isinstance(behavior, Pointing)
+        ray = body.estimate(behavior, None, self.world).ray
+        if ray is None:
+            return  # another law says so
+        slack = max(UNSURE, UPPER_ARM * math.dist(ray.origin, ray.tip or ray.origin))
+        within, beyond = (self._along(behavior, ray, reach + by) for by in (-slack, slack))
+        await self._check_points(body, behavior, within, f"that it points {reach - slack:.2f} m far")
+        body.see(beyond)
+        if body.estimate(behavior, None, beyond).feasible:
+            limit = f"a refusal of what is {reach + slack:.2f} m away, since its `reach` is {reach:.2f} m"
+            broken(expected=limit, measured="it is feasible")
+        body.see(self.world)
 
     def _along(self, behavior: Pointing, ray: Ray, distance: Meters) -> World:
         """The world with the target of a pointing farther away, or nearer, in the direction in which it is."""
         target = self.position(behavior.target)
         share = distance / math.dist(ray.origin, target)
         there = [here + share * (to - here) for here, to in zip(ray.origin, target, strict=True)]
-        place = (there[0], there[1], there[2])
-        return World(
-            entities=tuple(
-                replace(each, position=place) if each.id == behavior.target else each for each in self.world.entities
-            )
-        )
+        return self.world_with(behavior.target, (there[0], there[1], there[2]))
 
     async def _check_points(self, body: Body, behavior: Pointing, world: World, expected: str) -> None:
         body.see(world)
         if (told := body.estimate(behavior, None, world)).fault is not None or not told.feasible:
             reason = told.fault.reason if told.fault is not None else "it is infeasible"
-            broken(behavior, expected=expected, measured=f"it is refused: {reason}")
-        stage, entity = _OnTarget(self, body, behavior), world.entity(behavior.target)
-        await stage.over()
-        assert stage.state is not None
-        assert entity is not None
-        seen = [ray for ray in _rays(stage.state, behavior) if ray is not None]
-        off = min((aside(ray, entity.position) for ray in seen), default=0.0)
+            broken(expected=expected, measured=f"it is refused: {reason}")
+        seen, place = await self._on_target(body, behavior), self.position(behavior.target, world)
+        off = min((aside(ray, place) for ray in seen), default=0.0)
         if off > (near := 3.0 * self.accuracy + self.gaze_slack):
-            broken(behavior, "stroke", expected=f"{expected}, within {degrees(near)}", measured=degrees(off))
+            broken("stroke", expected=f"{expected}, within {degrees(near)}", measured=degrees(off))
 
-    async def test_counts_the_degrees_that_its_joints_turn(self, body: Body) -> None:
+    @by_each(AIMED, "nothing with a target")
+    async def test_counts_the_degrees_that_its_joints_turn(self, body: Body, behavior: BlockBehavior) -> None:
         """`head_degrees` and `arm_degrees` are the way of the joints to the target, from home and from another pose.
 
         Usually they are radians, or the angle of the target, or they are counted from the present pose whatever
         `pose` says. Generation chooses by them what is looked at and what is pointed at.
         """
-        for case in self.cases(body, lambda each: isinstance(each, AIMED), "nothing with a target"):
-            async with case as behavior:
-                joints = sorted(self.joints(body, behavior))
-                if not joints:
-                    continue
-                estimate, sync = body.estimate(behavior, None, self.world), target_point(behavior)
-                async with recorded(body, joints) as recording:
-                    at = times(await done(body, behavior))
-                    await asyncio.sleep(0.02)
-                start, there = recording.at(at["start"]), recording.at(at[sync])
-                way = sum(math.degrees(abs(there[joint] - start[joint])) for joint in joints)
-                self._check_degrees(behavior, estimate, way, len(joints), "from home")
-                here = estimate.pose_after
-                if here is None:
-                    continue
-                for other in self._aims(body, behavior):
-                    from_there = body.estimate(other, here, self.world)
-                    way = _way(here, from_there.pose_after, joints)
-                    what = f"from where {behavior.id} leaves it"
-                    self._check_degrees(other, from_there, way, len(joints), what)
-
-    def _aims(self, body: Body, behavior: BlockBehavior) -> list[BlockBehavior]:
-        """The same behavior, and one at something else."""
+        joints = sorted(self.joints(body, behavior))
+        if not joints:
+            return
+        estimate, sync = body.estimate(behavior, None, self.world), target_point(behavior)
+        async with recorded(body, joints) as recording:
+            at = times(await done(body, behavior))
+            await asyncio.sleep(0.02)
+        start, there = recording.at(at["start"]), recording.at(at[sync])
+        way = sum(math.degrees(abs(there[joint] - start[joint])) for joint in joints)
+        self._check_degrees(behavior, estimate, way, len(joints), "from home")
+        here = estimate.pose_after
+        if here is None:
+            return
         assert isinstance(behavior, AIMED)
-        others = [replace(behavior, target=each.id) for each in self.world.entities if each.id != behavior.target]
-        return [behavior, *[each for each in others if body.estimate(each, None, self.world).feasible][:1]]
+        for other in self.aims(body, behavior):
+            from_there = body.estimate(other, here, self.world)
+            way = _way(here, from_there.pose_after, joints)
+            what = f"from where {behavior.id} leaves it"
+            self._check_degrees(other, from_there, way, len(joints), what)
 
     def _check_degrees(self, behavior: BlockBehavior, said: Estimate, way: Degrees, joints: int, what: str) -> None:
         counted = said.head_degrees + said.arm_degrees
@@ -183,36 +166,31 @@ class ClaimLaws(Suite):
         is_by_a_way = isinstance(behavior, Pointing) and what != "from home"  # an arm may have to go round
         if not SHORTER * way - slack <= counted <= (math.inf if is_by_a_way else LONGER * way + slack):
             broken(
-                behavior,
                 target_point(behavior),
                 expected=f"about {way:.0f} degrees of its joints {what}",
                 measured=f"`head_degrees` {said.head_degrees:.0f}, `arm_degrees` {said.arm_degrees:.0f}",
             )
 
-    async def test_rehearses_what_it_estimates(self, body: Body) -> None:
+    @by_each()
+    async def test_rehearses_what_it_estimates(self, body: Body, behavior: BlockBehavior) -> None:
         """A rehearsal of one behavior, now and undisturbed, says what its estimate says.
 
         Usually `rehearse` has a model of its own. Plans are made of what it says, and in one of a single behavior
         nothing else moves.
         """
-        for case in self.cases(body):
-            async with case as behavior:
-                said = body.estimate(behavior, None, self.world)
-                planned = (PlannedTime(sync="start", at=0.0),)
-                for begins in ((), planned) if has_joints(behavior) else ((),):
-                    items = [EstimateItem(behavior=behavior, times=begins)]
-                    self._check_rehearsed(behavior, said, body.rehearse(items, self.world)[0])
-                    in_steps = finished(body.rehearse_in_steps(items, self.world))
-                    self._check_rehearsed(behavior, said, in_steps[0])
-                if isinstance(behavior, AIMED):
-                    items = [EstimateItem(behavior=behavior, only="degrees")]
-                    (told_degrees,) = body.rehearse(items, self.world)
-                    self._check_same_degrees(behavior, said, told_degrees)
+        said = body.estimate(behavior, None, self.world)
+        planned = (PlannedTime(sync="start", at=0.0),)
+        for begins in ((), planned) if has_joints(behavior) else ((),):
+            items = [EstimateItem(behavior=behavior, times=begins)]
+            self._check_rehearsed(said, body.rehearse(items, self.world)[0])
+            self._check_rehearsed(said, finished(body.rehearse_in_steps(items, self.world))[0])
+        if isinstance(behavior, AIMED):
+            (told,) = body.rehearse([EstimateItem(behavior=behavior, only="degrees")], self.world)
+            self._check_same_degrees(said, told)
 
-    def _check_rehearsed(self, behavior: BlockBehavior, said: Estimate, told: Estimate) -> None:
+    def _check_rehearsed(self, said: Estimate, told: Estimate) -> None:
         if told.feasible != said.feasible or [each.to for each in told.phases] != [each.to for each in said.phases]:
             broken(
-                behavior,
                 expected=f"the points of its estimate, {listed(each.to for each in said.phases)}",
                 measured=listed(each.to for each in told.phases),
             )
@@ -220,33 +198,26 @@ class ClaimLaws(Suite):
             for name in ("natural", "shortest"):
                 took, again = getattr(one, name), getattr(other, name)
                 if abs(took - again) > self.tolerance + 1e-6:
-                    broken(
-                        behavior,
-                        one.to,
-                        expected=f"`{name}` of its estimate, {ms(took)}",
-                        measured=f"{ms(again)} in the rehearsal",
-                    )
-        self._check_same_degrees(behavior, said, told)
+                    what = f"`{name}` of its estimate, {ms(took)}"
+                    broken(one.to, expected=what, measured=f"{ms(again)} in the rehearsal")
+        self._check_same_degrees(said, told)
 
-    def _check_same_degrees(self, behavior: BlockBehavior, said: Estimate, told: Estimate) -> None:
+    def _check_same_degrees(self, said: Estimate, told: Estimate) -> None:
         one, other = said.head_degrees + said.arm_degrees, told.head_degrees + told.arm_degrees
         if abs(one - other) > SAME + math.degrees(self.slack):
-            broken(
-                behavior, expected=f"the {one:.0f} degrees of its estimate", measured=f"{other:.0f} in the rehearsal"
-            )
+            broken(expected=f"the {one:.0f} degrees of its estimate", measured=f"{other:.0f} in the rehearsal")
 
-    async def test_is_as_fast_and_as_slow_as_it_said(self, body: Body) -> None:
+    @by_each(has_joints, "no joints")
+    async def test_is_as_fast_and_as_slow_as_it_said(self, body: Body, behavior: BlockBehavior) -> None:
         """Asked for its `shortest` time a body keeps it, and asked to be slow it takes up to its `longest`.
 
         Usually a driver with one pace leaves `shortest` at 0, or `longest` at None, which is "no limit". With one
         pace all three are the natural time; only at a hold point can it be any longer.
         """
-        for case in self.cases(body, has_joints, "no joints"):
-            async with case as behavior:
-                for is_fast in (True, False):
-                    await body.home()
-                    phases = body.estimate(behavior, None, self.world).phases
-                    await self._paced(body, behavior, phases, is_fast=is_fast)
+        for is_fast in (True, False):
+            await body.home()
+            phases = body.estimate(behavior, None, self.world).phases
+            await self._paced(body, behavior, phases, is_fast=is_fast)
 
     async def _paced(self, body: Body, behavior: BlockBehavior, phases: Sequence[Phase], *, is_fast: bool) -> None:
         """Let it go at a pace: in a hurry all the way, slowly from one place where it stands to the next."""
@@ -291,12 +262,8 @@ class ClaimLaws(Suite):
                 claim = f"`shortest` {ms(phase.shortest)}"
                 if not is_fast:
                     claim = f"`longest` {'None' if phase.longest is None else ms(phase.longest)}"
-                broken(
-                    stage.behavior,
-                    phase.to,
-                    expected=f"{ms(due)} as it was asked to, since {claim} allows it",
-                    measured=ms(took),
-                )
+                what = f"{ms(due)} as it was asked to, since {claim} allows it"
+                broken(phase.to, expected=what, measured=ms(took))
 
 
 class _OnTarget(Stage):
@@ -320,10 +287,6 @@ def _leads_to_hold(leg: Sequence[Phase]) -> bool:
         if phase.hold:
             return True
     return False
-
-
-def _rays(state: BodyState, behavior: BlockBehavior) -> tuple[Ray | None, ...]:
-    return arms(state, behavior.mode) if isinstance(behavior, Pointing) else (state.gaze,)
 
 
 def _way(here: BodyPose, there: BodyPose | None, joints: Sequence[str]) -> Degrees:

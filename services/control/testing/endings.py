@@ -2,20 +2,20 @@
 
 import asyncio
 import math
+from collections.abc import Mapping
 from random import Random
 
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
 from engage_hri.schemas.references import type_name
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.services.control.contract.body import AbortMode, Body, Spoke
-from engage_hri.services.control.testing.cases import Connection, still_running
 from engage_hri.services.control.testing.holding import NOTHING, is_movement
 from engage_hri.services.control.testing.laws import OLD_READINGS, broken, degrees, listed, ms
 from engage_hri.services.control.testing.motions import Recording, Violation, recorded, violations
-from engage_hri.services.control.testing.stage import PATIENCE, Stage, standing
-from engage_hri.services.control.testing.suite import Suite, does_not_apply, trials
+from engage_hri.services.control.testing.stage import PATIENCE, Connection, Stage, standing, still_running
+from engage_hri.services.control.testing.suite import Suite, by_each, does_not_apply, trials
 
 AT_ONCE: Seconds = 3.0
 """Time within which a behavior ends that is aborted: it may brake, and freeze for a moment."""
@@ -27,13 +27,15 @@ WORD: Seconds = 1.0
 HOWS: tuple[AbortMode, ...] = ("relax", "freeze")
 
 
+OVERLAY = "nothing that takes time and goes back to rest by itself"
+OLD: Seconds = 0.04
+"""Time for which readings come again in motion, from which on they are no measurement of it."""
+Angles = Mapping[str, Radians]
+
+
 def is_overlay(behavior: BlockBehavior) -> bool:
     """True for what goes back to rest by itself; a shift stays, wherever it was cut."""
     return not type_name(behavior).endswith("Shift") and type_name(behavior) != "pose"
-
-
-OLD: Seconds = 0.04
-"""Time for which readings come again in motion, from which on they are no measurement of it."""
 
 
 class EndingLaws(Suite):
@@ -41,59 +43,53 @@ class EndingLaws(Suite):
 
     topic = "ends"
 
-    async def test_an_aborted_behavior_ends_at_once_and_safe(self, body: Body) -> None:
+    @by_each(is_overlay, OVERLAY)
+    async def test_an_aborted_behavior_ends_at_once_and_safe(
+        self, body: Body, behavior: BlockBehavior, home: Angles
+    ) -> None:
         """Revoked on its way, a behavior ends within 3 s without `end`, and its parts go on to the safe pose.
 
         Usually `perform` waits for a motion to be over before it looks at the authority, or nobody commands the way
         home once the behavior has ended: do it in a `finally`.
         """
-        home = await self.pose(body)
-        lacks = "nothing that takes time and goes back to rest by itself"
-        for case in self.cases(body, lambda each: is_overlay(each) and self.half(body, each) > SHORTEST, lacks):
-            async with case as behavior:
-                for how in HOWS:
-                    after = min(0.35, self.half(body, behavior))
-                    stage = Stage(body, behavior, "end")
-                    await asyncio.sleep(after)
-                    stage.authority.revoke(how)
-                    await stage.over(AT_ONCE)
-                    if "end" in stage.passed:
-                        broken(
-                            behavior,
-                            "end",
-                            expected=f"no `end` of what was aborted after {ms(after)}",
-                            measured=f"passed {listed(stage.passed)}",
-                        )
-                    await self.check_rest(body, home, behavior, f"after an abort ({how})")
+        if self.half(body, behavior) <= SHORTEST:
+            does_not_apply(f"it has {OVERLAY}")
+        for how in HOWS:
+            after = min(0.35, self.half(body, behavior))
+            stage = Stage(body, behavior, "end")
+            await asyncio.sleep(after)
+            stage.authority.revoke(how)
+            await stage.over(AT_ONCE)
+            if "end" in stage.passed:
+                broken("end", expected=f"no `end` of what was aborted after {ms(after)}", measured=stage.told)
+            await self.check_rest(body, home, behavior, f"after an abort ({how})")
 
-    async def test_an_aborted_hold_ends_at_once_and_safe(self, body: Body) -> None:
+    @by_each(is_movement, NOTHING)
+    async def test_an_aborted_hold_ends_at_once_and_safe(
+        self, body: Body, behavior: BlockBehavior, home: Angles
+    ) -> None:
         """Revoked where it waits, a behavior ends within 3 s, and its parts go on to the safe pose.
 
         Usually it waits for a point that never comes: `await authority.granted(...)` raises `Revoked`.
         """
-        home = await self.pose(body)
-        for case in self.cases(body, is_movement, NOTHING):
-            async with case as behavior:
-                stage = Stage(body, behavior)
-                await stage.holding()
-                stage.authority.revoke()
-                await stage.over(AT_ONCE)
-                await self.check_rest(body, home, behavior, "after an aborted wait")
+        stage = Stage(body, behavior)
+        await stage.holding()
+        stage.authority.revoke()
+        await stage.over(AT_ONCE)
+        await self.check_rest(body, home, behavior, "after an aborted wait")
 
-    async def test_a_dropped_stream_ends_safe(self, body: Body) -> None:
+    @by_each()
+    async def test_a_dropped_stream_ends_safe(self, body: Body, behavior: BlockBehavior, home: Angles) -> None:
         """`home` brings parts to the safe pose also from a behavior whose task was cancelled.
 
         Usually the part still belongs to the behavior that is gone: give it back in a `finally`.
         """
-        home = await self.pose(body)
-        for case in self.cases(body):
-            async with case as behavior:
-                stage = Stage(body, behavior, "end")
-                await asyncio.sleep(0.35)
-                stage.task.cancel()
-                await asyncio.gather(stage.task, return_exceptions=True)
-                await self.go_home(body)
-                await self.check_rest(body, home, behavior, "after its task was cancelled")
+        stage = Stage(body, behavior, "end")
+        await asyncio.sleep(0.35)
+        stage.task.cancel()
+        await asyncio.gather(stage.task, return_exceptions=True)
+        await self.go_home(body)
+        await self.check_rest(body, home, behavior, "after its task was cancelled")
 
     async def test_home_is_reached_from_anything(self, body: Body) -> None:
         """`home` returns when the body is at its safe pose, whatever it was doing; those behaviors end as aborted.
@@ -109,9 +105,7 @@ class EndingLaws(Suite):
         under_way = [stage for stage in stages if not stage.task.done()]
         await self.go_home(body)
         joints = self.joints(body)
-        self.check_pose(
-            await self.pose(body), home, joints, stages[0].behavior, what="the safe pose as `home` returns"
-        )
+        self.check_pose(await self.pose(body), home, joints, what="the safe pose as `home` returns")
         if not await standing(body, WORD) or body.state().speaking:
             broken(
                 expected=f"`moving` false and silence {ms(WORD)} after `home` has returned",
@@ -120,16 +114,13 @@ class EndingLaws(Suite):
         await asyncio.wait([stage.task for stage in stages], timeout=AT_ONCE)
         for stage in under_way:
             if not stage.task.done() or "end" in stage.passed:
-                broken(
-                    stage.behavior,
-                    expected="that it ends as `home` takes its parts, without `end`",
-                    measured=f"passed {listed(stage.passed)}"
-                    + ("" if stage.task.done() else f"; it goes on {ms(AT_ONCE)} later"),
-                )
+                what = f"that it ends within {ms(AT_ONCE)} as `home` takes its parts, without `end`"
+                broken(behavior=stage.behavior, expected=what, measured=stage.told)
             if stage.authority.revoked is None:
-                broken(stage.behavior, expected="that `home` revokes its authority", measured="it is not revoked")
+                what = "that `home` revokes its authority"
+                broken(behavior=stage.behavior, expected=what, measured="it is not revoked")
         await asyncio.sleep(self.dwell)
-        self.check_pose(await self.pose(body), home, joints, stages[0].behavior, what="the safe pose some time later")
+        self.check_pose(await self.pose(body), home, joints, what="the safe pose some time later")
 
     async def go_home(self, body: Body, parts: tuple[str, ...] = ()) -> None:
         """Call parts of the body home; empty: all. Raises LawBroken if they do not get there."""
@@ -141,50 +132,50 @@ class EndingLaws(Suite):
             broken(expected=what, measured="it does not", cause="`home` never returns")
 
     @trials(2)
-    async def test_brakes_within_the_limits_of_its_joints(self, body: Body, seed: int) -> None:
+    @by_each(is_movement, NOTHING)
+    async def test_brakes_within_the_limits_of_its_joints(
+        self, body: Body, behavior: BlockBehavior, seed: int
+    ) -> None:
         """Held and aborted at any instant on its way, no joint exceeds its speed or acceleration.
 
         Usually a stop is a command to be where the joint is now. Brake with the acceleration that `capabilities`
         names, or name the one that the motors have.
         """
         self._needs_limits(body)
-        chance = Random(seed)
-        for case in self.cases(body, is_movement, NOTHING):
-            async with case as behavior:
-                async with recorded(body) as recording:
-                    stage = Stage(body, behavior, "end")
-                    for _ in range(4):
-                        await asyncio.sleep(chance.uniform(0.0, 0.4))
-                        stage.authority.hold()
-                        await asyncio.sleep(chance.choice((0.02, 0.1, 0.5)))
-                        stage.authority.go_on()
-                    await stage.over()
-                    stage = Stage(body, behavior, "end")
-                    await asyncio.sleep(chance.uniform(0.1, 0.5))
-                    stage.authority.revoke(chance.choice(HOWS))
-                    await stage.over()
-                    await self.go_home(body)
-                self.check_limits(body, recording, behavior)
+        chance = Random(f"{seed} {behavior.id}")
+        async with recorded(body) as recording:
+            stage = Stage(body, behavior, "end")
+            for _ in range(4):
+                await asyncio.sleep(chance.uniform(0.0, 0.4))
+                stage.authority.hold()
+                await asyncio.sleep(chance.choice((0.02, 0.1, 0.5)))
+                stage.authority.go_on()
+            await stage.over()
+            stage = Stage(body, behavior, "end")
+            await asyncio.sleep(chance.uniform(0.1, 0.5))
+            stage.authority.revoke(chance.choice(HOWS))
+            await stage.over()
+            await self.go_home(body)
+        self.check_limits(body, recording)
 
-    async def test_keeps_its_limits_whatever_comes(self, body: Body) -> None:
+    @by_each()
+    async def test_keeps_its_limits_whatever_comes(self, body: Body, behavior: BlockBehavior) -> None:
         """No joint leaves its range, its speed or its acceleration, whatever is begun, taken over and aborted.
 
         Usually a new command starts as if the joints stood still, and the motors are asked to jump; or the limits in
         `capabilities` are those of the data sheet, and the motors are set to others.
         """
         self._needs_limits(body)
-        for case in self.cases(body):
-            async with case as behavior:
-                async with recorded(body) as recording:
-                    stage = Stage(body, behavior)
-                    await asyncio.sleep(0.3)
-                    stage.authority.extend("end")
-                    other = Stage(body, replace(behavior, id="other"), "end")
-                    await asyncio.sleep(0.25)
-                    other.authority.revoke()
-                    await asyncio.gather(stage.task, other.task, return_exceptions=True)
-                    await self.go_home(body)
-                self.check_limits(body, recording, behavior)
+        async with recorded(body) as recording:
+            stage = Stage(body, behavior)
+            await asyncio.sleep(0.3)
+            stage.authority.extend("end")
+            other = Stage(body, replace(behavior, id="other"), "end")
+            await asyncio.sleep(0.25)
+            other.authority.revoke()
+            await asyncio.gather(stage.task, other.task, return_exceptions=True)
+            await self.go_home(body)
+        self.check_limits(body, recording)
 
     async def test_home_takes_the_parts_that_it_is_asked_for_and_no_others(self, body: Body) -> None:
         """`home(parts)` brings these to the safe pose and ends what they do; behaviors of other parts go on.
@@ -201,19 +192,20 @@ class EndingLaws(Suite):
             before = await self.pose(body)
             await self.go_home(body, parts)
             after, mine = await self.pose(body), stages[number]
-            self.check_pose(after, home, joints[first.id], first, what=f"the safe pose of {listed(parts)}")
+            safe = f"the safe pose of {listed(parts)}"
+            self.check_pose(after, home, joints[first.id], what=safe, behavior=first)
             await asyncio.wait([mine.task], timeout=AT_ONCE)
             if not mine.task.done() or "end" in mine.passed:
-                broken(first, expected="that it ends as its parts go home", measured=f"passed {listed(mine.passed)}")
+                broken(behavior=first, expected="that it ends as its parts go home", measured=mine.told)
             for stage, (other, _) in zip(stages, together, strict=True):
                 if stage is mine:
                     continue
                 if stage.task.done() or stage.authority.revoked is not None:
                     expected = f"that it goes on while {listed(parts)} goes home"
-                    broken(stage.behavior, expected=expected, measured=f"revoked: {stage.authority.revoked}")
+                    broken(behavior=stage.behavior, expected=expected, measured=stage.told)
                 if "torso" not in parts:  # that takes all others with it
                     what = f"where it was before {listed(parts)} went home"
-                    self.check_pose(after, before, joints[other.id], other, what=what)
+                    self.check_pose(after, before, joints[other.id], what=what, behavior=other)
                 stage.authority.extend("end")
             for stage in stages:
                 await stage.over()
@@ -236,7 +228,7 @@ class EndingLaws(Suite):
         if not body.capabilities.joints:
             does_not_apply("its capabilities name no joints")
 
-    def check_limits(self, body: Body, recording: Recording, behavior: BlockBehavior) -> None:
+    def check_limits(self, body: Body, recording: Recording) -> None:
         """Judge what was recorded. Raises LawBroken with the first limit that was left."""
         if self.fastest is not None:
             for joint, speed in recording.fastest(self.noise).items():
@@ -244,7 +236,6 @@ class EndingLaws(Suite):
         for each in violations(recording, body.capabilities.joints, self.noise, self.age):
             if (repeats := recording.repeats) > OLD:
                 broken(
-                    behavior,
                     expected=f"new readings while {each.joint} moves, to judge its {each.what} by",
                     measured=f"each comes again for {ms(repeats)}",
                     advice="are the motors asked often enough, and is it the newest reading that `angles` tells?",
@@ -253,7 +244,6 @@ class EndingLaws(Suite):
             unit = each.unit.removeprefix("degrees")
             when = each.at - recording.times[0]
             broken(
-                behavior,
                 expected=f"{each.what} of {each.joint} up to {degrees(each.limit)}{unit}",
                 measured=f"{degrees(each.measured)}{unit}, {ms(when)} after it was asked for",
                 advice=_encoders(each) if each.what != "range" else "",
@@ -265,10 +255,10 @@ class EndingLaws(Suite):
         Usually a task is created in `__init__` or `home`, and nobody ends it: tasks belong into `connected()`, and a
         timer that sets itself again is cancelled there.
         """
-        for is_home in (True, False):
-            await self._check_leaving(is_home)
+        await self._check_leaving(is_home=True)
+        await self._check_leaving(is_home=False)
 
-    async def _check_leaving(self, is_home: bool) -> None:
+    async def _check_leaving(self, *, is_home: bool) -> None:
         before = asyncio.all_tasks()
         body = self.make()
         connection = Connection(body)
@@ -300,25 +290,25 @@ class EndingLaws(Suite):
 
         Usually all words are told as the synthesiser returns, before the sound is played.
         """
-        if "speech" not in self.types(body):
-            self.lacks(body, "it has no voice", "speech")
+        self.needs(body, "voice", "speech")
         words = ["one", "two", "three", "four", "five", "six", "seven"]
         speech = Speech(id="long", text=" ".join(words))
         stage = Stage(body, speech, "end")
         await asyncio.sleep(0.8)
         if not body.state().speaking:
-            broken(speech, expected="its text in `speaking` while it speaks", measured="an empty `speaking`")
+            what = "its text in `speaking` while it speaks"
+            broken(behavior=speech, expected=what, measured="an empty `speaking`")
         stage.authority.revoke()
         progress = await stage.over(AT_ONCE)
         said = [each.word for each in progress if isinstance(each, Spoke)]
         if not 0 < len(said) < len(words) or said != words[: len(said)] or "end" in stage.passed:
             broken(
-                speech,
+                behavior=speech,
                 expected="some of its words in order, and no `end`, 800 ms after it began",
-                measured=f"{' '.join(said)!r}; passed {listed(stage.passed)}",
+                measured=f"{' '.join(said)!r}; {stage.told}",
             )
         if saying := body.state().speaking:
-            broken(speech, expected="silence once it has ended", measured=f"`speaking` is {saying!r}")
+            broken(behavior=speech, expected="silence once it has ended", measured=f"`speaking` is {saying!r}")
 
 
 def _encoders(violation: Violation) -> str:

@@ -20,8 +20,7 @@ from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.contract.body import Body
-from engage_hri.services.control.testing.cases import Connection, cause_of
-from engage_hri.services.control.testing.causes import by_words
+from engage_hri.services.control.testing.findings import cause_of
 from engage_hri.services.control.testing.laws import (
     NEVER_ENDS,
     NOTHING_MOVES,
@@ -30,9 +29,10 @@ from engage_hri.services.control.testing.laws import (
     degrees,
     listed,
     named,
+    turned,
 )
-from engage_hri.services.control.testing.report import Cause
-from engage_hri.services.control.testing.stage import LOOK_EVERY, PATIENCE, Stage
+from engage_hri.services.control.testing.report import Cause, by_words
+from engage_hri.services.control.testing.stage import LOOK_EVERY, PATIENCE, Connection, Stage
 from engage_hri.services.control.testing.suite import STILL
 
 LOOKS = 20
@@ -167,7 +167,7 @@ class _Looking:
                 await asyncio.sleep(LOOK_EVERY)
                 now = angles(self._body.state().pose)
                 self._farthest = {each: max(abs(now[each]), self._farthest.get(each, 0.0)) for each in now}
-                away = max((abs(angle - before.get(joint, angle)) for joint, angle in now.items()), default=0.0)
+                away = turned(now, before)
                 is_moved = is_moved or away > 5 * STILL + 12.0 * self._noise
             if stage.task.done():
                 stage.task.result()

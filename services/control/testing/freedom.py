@@ -19,12 +19,13 @@ from typing import Any
 
 from msgspec import Struct
 
+from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.testing.laws import broken, ms
 from engage_hri.services.control.testing.motions import recorded
 from engage_hri.services.control.testing.stage import done
-from engage_hri.services.control.testing.suite import Suite
+from engage_hri.services.control.testing.suite import Suite, by_each
 
 LONGEST: Seconds = 0.02
 """Most that one call of the loop may hold it: less than half of the time in which a point has to be told."""
@@ -36,32 +37,30 @@ class FreedomLaws(Suite):
 
     topic = "the loop"
 
-    async def test_keeps_the_loop_free(self, body: Body) -> None:
+    @by_each()
+    async def test_keeps_the_loop_free(self, body: Body, behavior: BlockBehavior) -> None:
         """Nothing that a body does holds the loop for more than 20 ms: others have their turn meanwhile.
 
         Usually `go`, `angles` or a task of the driver calls an SDK that blocks (a serial port, HTTP, `time.sleep`):
         `await asyncio.to_thread(...)` in the driver, or a process of its own for the SDK.
         """
-        for case in self.cases(body):
-            async with case as behavior:
-                turns: list[LoopTurn] = []
-                while len(turns) < TRIES and (not turns or turns[-1].held > LONGEST):
-                    async with recorded(body):
-                        with longest_turn() as turn:
-                            body.see(self.world)
-                            await done(body, behavior)
-                            await body.home()
-                    turns.append(turn)
-                best = min(turns, key=lambda each: each.held)
-                if best.held > LONGEST:
-                    broken(
-                        behavior,
-                        expected=f"at most {ms(LONGEST)} in one call of the loop",
-                        measured=f"{ms(best.held)}, of which it computes {ms(best.computes)}",
-                        advice="it computes: in a process of its own, or with an `await` in between"
-                        if best.computes > best.held / 2
-                        else "it waits: by `await asyncio.to_thread(...)`, or in a process of its own",
-                    )
+        turns: list[LoopTurn] = []
+        while len(turns) < TRIES and (not turns or turns[-1].held > LONGEST):
+            async with recorded(body):
+                with longest_turn() as turn:
+                    body.see(self.world)
+                    await done(body, behavior)
+                    await body.home()
+            turns.append(turn)
+        best = min(turns, key=lambda each: each.held)
+        if best.held > LONGEST:
+            broken(
+                expected=f"at most {ms(LONGEST)} in one call of the loop",
+                measured=f"{ms(best.held)}, of which it computes {ms(best.computes)}",
+                advice="it computes: in a process of its own, or with an `await` in between"
+                if best.computes > best.held / 2
+                else "it waits: by `await asyncio.to_thread(...)`, or in a process of its own",
+            )
 
 
 class LoopTurn(Struct):

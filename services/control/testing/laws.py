@@ -4,7 +4,7 @@ Angles are in degrees and times in milliseconds: these words are for people who 
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NoReturn
 
 from msgspec import Struct
@@ -27,9 +27,9 @@ from engage_hri.schemas.behaviors import (
     expressed,
     posed,
 )
-from engage_hri.schemas.body import BodyPose
+from engage_hri.schemas.body import BodyPose, Ray
 from engage_hri.schemas.references import type_name
-from engage_hri.schemas.units import Radians, Seconds
+from engage_hri.schemas.units import Meters, Radians, Seconds, Vector
 
 NEVER_ENDS = "what is begun never ends"
 NOTHING_MOVES = "nothing moves"
@@ -71,17 +71,17 @@ class LawBroken(AssertionError):
 
 
 def broken(
-    behavior: BlockBehavior | str = "",
     sync: str = "",
     *,
     expected: str,
     measured: str,
+    behavior: BlockBehavior | None = None,
     advice: str = "",
     cause: str = "",
 ) -> NoReturn:
-    """Raise LawBroken with this finding."""
+    """Raise LawBroken with this finding. behavior: None: the one that the law is judged by, if it is."""
     __tracebackhide__ = True
-    place = behavior if isinstance(behavior, str) else named(behavior)
+    place = "" if behavior is None else named(behavior)
     finding = Finding(behavior=place, sync=sync, expected=expected, measured=measured, advice=advice, cause=cause)
     raise LawBroken([finding])
 
@@ -135,7 +135,34 @@ def angles(pose: BodyPose) -> dict[str, Radians]:
     return {each.joint: each.angle for each in pose.joints}
 
 
+def turned(one: Mapping[str, Radians], other: Mapping[str, Radians]) -> Radians:
+    """The most by which a joint of one pose has turned in another one; 0 if they have none in common."""
+    return max((abs(angle - other[joint]) for joint, angle in one.items() if joint in other), default=0.0)
+
+
 def poses_agree(one: BodyPose, other: BodyPose, within: Radians = 0.01) -> bool:
     """True if each joint of one pose is where it is in the other."""
     there = angles(other)
     return all(abs(angle - there[joint]) < within for joint, angle in angles(one).items())
+
+
+# -- rays and points -----------------------------------------------------------------------------------------------
+
+
+def aside(ray: Ray, point: Vector) -> Radians:
+    """Angle between a ray and the direction from its origin to a point."""
+    way = [there - here for here, there in zip(ray.origin, point, strict=True)]
+    along = sum(a * b for a, b in zip(ray.axis, way, strict=True))
+    return math.acos(max(-1.0, min(1.0, along / math.hypot(*way))))
+
+
+def angle(one: Vector, other: Vector) -> Radians:
+    """Angle between two unit vectors."""
+    return math.acos(max(-1.0, min(1.0, sum(a * b for a, b in zip(one, other, strict=True)))))
+
+
+def beside(ray: Ray, point: Vector) -> Meters:
+    """Distance by which a point lies beside a ray; inf behind it."""
+    way = [there - here for here, there in zip(ray.origin, point, strict=True)]
+    along = sum(a * b for a, b in zip(ray.axis, way, strict=True))
+    return math.sqrt(max(0.0, sum(each * each for each in way) - along * along)) if along > 0 else math.inf

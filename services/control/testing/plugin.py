@@ -1,6 +1,7 @@
 """The plugin of pytest for the contract suite: the virtual clock, and the marker `real_time`.
 
-It is loaded by who names it (`pytest_plugins`, or `-p`), and touches no test but those of the suite.
+It is loaded by who names it (`pytest_plugins`, or `-p`), and touches no test but those of the suite. It has no
+asserts that pytest could tell more of, and may be imported before pytest loads it: PYTEST_DONT_REWRITE.
 """
 
 import asyncio

@@ -1,21 +1,25 @@
 """Laws of estimates: they come true, within the error that a body states, and asking for them changes nothing."""
 
 import asyncio
-from collections.abc import Mapping
-
-from msgspec.structs import replace
 
 from engage_hri.schemas.behavior_types import sync_points
-from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Head, HeadDirectionShift, Speech, Wait
-from engage_hri.schemas.body import Estimate, EstimateItem
-from engage_hri.schemas.units import Radians, Seconds
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Head, Speech, Wait
+from engage_hri.schemas.body import EstimateItem
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.body import Body
-from engage_hri.services.control.testing.laws import broken, listed, ms, named
+from engage_hri.services.control.testing.asked import LOOKS
+from engage_hri.services.control.testing.laws import broken, listed, ms, named, turned
 from engage_hri.services.control.testing.motions import recorded
-from engage_hri.services.control.testing.stage import Stage, default, done, standing, times
-from engage_hri.services.control.testing.suite import Suite, pose_angles
-
-LOOKS = Gaze | GazeShift | HeadDirectionShift
+from engage_hri.services.control.testing.stage import (
+    Stage,
+    default,
+    done,
+    standing,
+    target_point,
+    times,
+    until_target,
+)
+from engage_hri.services.control.testing.suite import Suite, by_each, pose_angles
 
 
 def has_joints(behavior: BlockBehavior) -> bool:
@@ -33,40 +37,30 @@ class PredictionLaws(Suite):
 
     topic = "predictions"
 
-    async def test_takes_the_time_that_it_predicted(self, body: Body) -> None:
+    @by_each()
+    async def test_takes_the_time_that_it_predicted(self, body: Body, behavior: BlockBehavior) -> None:
         """Time from each sync point to the next is what its estimate said, within the stated `tolerance`.
 
         Usually the estimate is the time of the command: the joints arrive later, or they are near enough already
         before it is over. Measure by how much, and count that in; or state a larger tolerance.
         """
-        for case in self.cases(body):
-            async with case as behavior:
-                estimate = body.estimate(behavior, None, self.world)
-                points = ("start", *default([phase.to for phase in estimate.phases]))
-                if points != sync_points(behavior):
-                    broken(
-                        behavior,
-                        expected=f"phases from `start` to `end`: {listed(sync_points(behavior))}",
-                        measured=listed(points),
-                    )
-                realized = times(await done(body, behavior))
-                for phase in estimate.phases:
-                    took = realized[phase.to] - realized[phase.since]
-                    if abs(took - phase.natural) > self.tolerance + 1e-9:
-                        broken(
-                            behavior,
-                            phase.to,
-                            expected=f"{ms(phase.natural)} from {phase.since}, within {ms(self.tolerance)}",
-                            measured=f"{ms(took)}",
-                            advice=_apart(took, phase.natural),
-                        )
-                    if phase.shortest > phase.natural + 1e-9:
-                        broken(
-                            behavior,
-                            phase.to,
-                            expected=f"a shortest time up to the natural {ms(phase.natural)}",
-                            measured=ms(phase.shortest),
-                        )
+        estimate = body.estimate(behavior, None, self.world)
+        points = ("start", *default([phase.to for phase in estimate.phases]))
+        if points != sync_points(behavior):
+            broken(expected=f"phases from `start` to `end`: {listed(sync_points(behavior))}", measured=listed(points))
+        realized = times(await done(body, behavior))
+        for phase in estimate.phases:
+            took = realized[phase.to] - realized[phase.since]
+            if abs(took - phase.natural) > self.tolerance + 1e-9:
+                broken(
+                    phase.to,
+                    expected=f"{ms(phase.natural)} from {phase.since}, within {ms(self.tolerance)}",
+                    measured=f"{ms(took)}",
+                    advice=_apart(took, phase.natural),
+                )
+            if phase.shortest > phase.natural + 1e-9:
+                what = f"a shortest time up to the natural {ms(phase.natural)}"
+                broken(phase.to, expected=what, measured=ms(phase.shortest))
 
     async def test_predicts_without_moving(self, body: Body) -> None:
         """Estimates and rehearsals move nothing and change nothing: asked twice, a body says the same.
@@ -86,125 +80,74 @@ class PredictionLaws(Suite):
             broken(expected="a body that stands after it was asked", measured="`moving` is true")
         await asyncio.sleep(0.5)
         after = await self.pose(body)
-        self.check_pose(after, before, set(after), able[0], what="where it was before it was asked")
-        again = [body.estimate(each, None, self.world) for each in able]
-        for behavior, one, other in zip(able, first, again, strict=True):
-            for phase, same in zip(one.phases, other.phases, strict=True):
+        self.check_pose(after, before, set(after), what="where it was before it was asked")
+        for behavior, said in zip(able, first, strict=True):
+            again = body.estimate(behavior, None, self.world)
+            for phase, same in zip(said.phases, again.phases, strict=True):
                 if abs(phase.natural - same.natural) > 1e-9 + self.tolerance:
-                    broken(
-                        behavior,
-                        phase.to,
-                        expected=f"the same answer again, {ms(phase.natural)}",
-                        measured=ms(same.natural),
-                    )
+                    what = f"the same answer again, {ms(phase.natural)}"
+                    broken(phase.to, behavior=behavior, expected=what, measured=ms(same.natural))
 
-    async def test_is_on_target_where_it_said(self, body: Body) -> None:
+    @by_each(has_target, "nothing with a target or a pose")
+    async def test_is_on_target_where_it_said(self, body: Body, behavior: BlockBehavior) -> None:
         """Joints on target (from `stroke` to `relax`, of a shift at `end`) are where `pose_after` said.
 
         Usually `pose_after` is the goal, and the joints are short of it when the point is told: tell it from measured
         angles. What the next reference costs is counted from `pose_after`.
         """
-        for case in self.cases(body, has_target, "nothing with a target or a pose"):
-            async with case as behavior:
-                joints, wanted = self.joints(body, behavior), body.estimate(behavior, None, self.world).pose_after
-                if joints and wanted is None:
-                    broken(behavior, expected="`pose_after`, the joints on target", measured="None")
-                async with recorded(body, joints) as recording:
-                    at = times(await done(body, behavior))
-                    await asyncio.sleep(0.02)
-                # Where a stroke is a motion, the target may be anywhere in it.
-                since, until = at.get("stroke", at["end"]), at.get("relax", at["end"])
-                there = [recording.at(since + (until - since) * share / 10) for share in range(11)]
-                nearest = min(there, key=lambda seen: _distance(seen, pose_angles(wanted)))
-                self.check_pose(
-                    nearest,
-                    pose_angles(wanted),
-                    joints,
-                    behavior,
-                    "stroke" if "stroke" in at else "end",
-                    what="where `pose_after` said",
-                )
+        joints, wanted = self.joints(body, behavior), body.estimate(behavior, None, self.world).pose_after
+        if joints and wanted is None:
+            broken(expected="`pose_after`, the joints on target", measured="None")
+        async with recorded(body, joints) as recording:
+            at = times(await done(body, behavior))
+            await asyncio.sleep(0.02)
+        # Where a stroke is a motion, the target may be anywhere in it.
+        since, until = at.get("stroke", at["end"]), at.get("relax", at["end"])
+        there = [recording.at(since + (until - since) * share / 10) for share in range(11)]
+        due, sync = pose_angles(wanted), "stroke" if "stroke" in at else "end"
+        nearest = min(there, key=lambda seen: turned(seen, due))
+        self.check_pose(nearest, due, joints, sync, what="where `pose_after` said")
 
-    async def test_ends_where_it_said(self, body: Body) -> None:
+    @by_each(has_joints, "no joints")
+    async def test_ends_where_it_said(self, body: Body, behavior: BlockBehavior) -> None:
         """Joints of its parts are in the end where `pose_end` said, if it says that.
 
         Usually `pose_end` is the pose of rest, and a shift has changed to where the head goes back.
         """
-        for case in self.cases(body, has_joints, "no joints"):
-            async with case as behavior:
-                estimate, joints = body.estimate(behavior, None, self.world), self.joints(body, behavior)
-                await done(body, behavior)
-                if not await standing(body):
-                    broken(behavior, "end", expected="a body that comes to stand", measured="`moving` stays true")
-                self.check_pose(
-                    await self.pose(body),
-                    pose_angles(estimate.pose_end),
-                    joints,
-                    behavior,
-                    "end",
-                    what="where `pose_end` said",
-                )
+        estimate, joints = body.estimate(behavior, None, self.world), self.joints(body, behavior)
+        await done(body, behavior)
+        await self.check_stands(body, "end")
+        due = pose_angles(estimate.pose_end)
+        self.check_pose(await self.pose(body), due, joints, "end", what="where `pose_end` said")
 
-    async def test_predicts_from_where_another_look_leaves_it(self, body: Body) -> None:
+    @by_each(LOOKS, "no looks")
+    async def test_predicts_from_where_another_look_leaves_it(self, body: Body, behavior: BlockBehavior) -> None:
         """An estimate from the `pose_after` of another look, or of the same, is what it then takes from there.
 
         Usually `estimate` ignores its `pose`, and takes the present one: generation asks about several references.
         What its estimates are wrong by anyhow, from home, counts for nothing here.
         """
-        for case in self.cases(body, lambda each: isinstance(each, LOOKS), "no looks"):
-            async with case as behavior:
-                assert isinstance(behavior, LOOKS)
-                off = await self._off_from_home(body, behavior)
-                for other in self._others(body, behavior):
-                    await body.home()
-                    there = body.estimate(other, None, self.world).pose_after
-                    due = _until_target(body.estimate(behavior, there, self.world), behavior)
-                    stage = Stage(body, other, "start" if isinstance(other, Gaze) else "end")
-                    await stage.holding()
-                    await standing(body)
-                    took = await self._took(body, behavior)
-                    await stage.over()
-                    if min(abs(took - due), abs(took - due - off)) > self.tolerance + 1e-9:
-                        broken(
-                            behavior,
-                            "stroke" if isinstance(behavior, Gaze) else "end",
-                            expected=f"{ms(due)} from its start, after {named(other)}",
-                            measured=ms(took),
-                        )
+        assert isinstance(behavior, LOOKS)
+        sync, said = target_point(behavior), body.estimate(behavior, None, self.world)
+        off = await self._took(body, behavior, sync) - until_target(said, behavior)
+        for other in self.aims(body, behavior):
+            await body.home()
+            there = body.estimate(other, None, self.world).pose_after
+            due = until_target(body.estimate(behavior, there, self.world), behavior)
+            stage = Stage(body, other, "start" if isinstance(other, Gaze) else "end")
+            await stage.holding()
+            await standing(body)
+            took = await self._took(body, behavior, sync)
+            await stage.over()
+            if min(abs(took - due), abs(took - due - off)) > self.tolerance + 1e-9:
+                broken(sync, expected=f"{ms(due)} from its start, after {named(other)}", measured=ms(took))
 
-    async def _off_from_home(self, body: Body, behavior: BlockBehavior) -> Seconds:
-        """Time by which a look takes longer than it says, from home to its target."""
-        due = _until_target(body.estimate(behavior, None, self.world), behavior)
-        took = await self._took(body, behavior)
-        return took - due
-
-    async def _took(self, body: Body, behavior: BlockBehavior) -> Seconds:
+    async def _took(self, body: Body, behavior: BlockBehavior, sync: str) -> Seconds:
         realized = times(await done(body, behavior))
-        return realized["stroke" if isinstance(behavior, Gaze) else "end"] - realized["start"]
-
-    def _others(self, body: Body, behavior: Gaze | GazeShift | HeadDirectionShift) -> list[BlockBehavior]:
-        """The same look, and one at something else if it can: they are what is looked at before."""
-        others = [
-            replace(behavior, id="other", target=entity.id)
-            for entity in self.world.entities
-            if entity.id != behavior.target
-        ]
-        able = [each for each in others if body.estimate(each, None, self.world).feasible]
-        return [replace(behavior, id="same"), *able[:1]]
-
-
-def _until_target(estimate: Estimate, behavior: BlockBehavior) -> Seconds:
-    """Time from start to target, as an estimate has it."""
-    sync = "stroke" if isinstance(behavior, Gaze) else "end"
-    points = [phase.to for phase in estimate.phases]
-    return sum(phase.natural for phase in estimate.phases[: points.index(sync) + 1])
+        return realized[sync] - realized["start"]
 
 
 def _apart(took: Seconds, said: Seconds) -> str:
     if took > said:
         return f"it comes {ms(took - said)} later than it says: the estimate is to count that in"
     return f"it comes {ms(said - took)} earlier than it says: the estimate is too long by that"
-
-
-def _distance(one: Mapping[str, Radians], other: Mapping[str, Radians]) -> Radians:
-    return max((abs(angle - other[joint]) for joint, angle in one.items() if joint in other), default=0.0)

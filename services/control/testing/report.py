@@ -1,10 +1,11 @@
-"""Report of a body that was checked: what it is, and law by law whether it holds. Pure."""
+"""Report of a body that was checked: what it is, law by law whether it holds, and what breaks many. Pure."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal
 
 import msgspec
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.body import Capabilities
 from engage_hri.schemas.units import Radians, Seconds
@@ -102,6 +103,39 @@ def as_json(report: BodyReport) -> str:
     return msgspec.json.encode({"good": report.is_good, **msgspec.to_builtins(report)}).decode()
 
 
-def verdict(findings: Iterable[Finding], passed: int) -> Verdict:
-    """Judge a law by what was found in all of its trials, and how many of them passed."""
-    return "broken" if tuple(findings) else "holds" if passed else "does not apply"
+def told_once(laws: Iterable[CheckedLaw], known: Sequence[Cause]) -> tuple[tuple[CheckedLaw, ...], tuple[Cause, ...]]:
+    """Find what shows in several laws, and take these laws for not judged where nothing else is wrong.
+
+    known: what the first look has found; it counts also where it shows in one law, or in none.
+    """
+    laws = tuple(laws)
+    shown: dict[str, dict[str, None]] = {cause.what: {} for cause in known}
+    for law in laws:
+        for finding in law.findings:
+            if finding.cause:
+                shown.setdefault(finding.cause, {})[law.law] = None
+    first = {cause.what: cause.behaviors for cause in known}
+    causes = tuple(
+        Cause(what=what, behaviors=first.get(what, ()), laws=tuple(names))
+        for what, names in shown.items()
+        if what in first or len(names) > 1
+    )
+    shared = {cause.what for cause in causes}
+    judged = (
+        replace(law, verdict="not judged")
+        if law.findings and all(finding.cause in shared for finding in law.findings)
+        else law
+        for law in laws
+    )
+    return tuple(judged), causes
+
+
+def by_words(outcomes: Mapping[str, str]) -> tuple[Cause, ...]:
+    """Put together behaviors of which the same is true.
+
+    outcomes: what went wrong with each behavior, both in words.
+    """
+    found: dict[str, list[str]] = {}
+    for behavior, what in outcomes.items():
+        found.setdefault(what, []).append(behavior)
+    return tuple(Cause(what=what, behaviors=tuple(behaviors)) for what, behaviors in found.items())

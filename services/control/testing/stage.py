@@ -1,11 +1,12 @@
-"""A behavior under way, with the authority in the hand of the suite; and the waiting that goes with it."""
+"""A behavior under way, with the authority in the hand of the suite; the waiting that goes with it; a connection."""
 
 import asyncio
-from collections.abc import Callable, Sequence
-from typing import ClassVar
+from collections.abc import Callable, Sequence, Set
+from typing import Any, ClassVar
 
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.body import Arrived, Body, MovementAuthority, Progress, Reached, Revocation
 from engage_hri.services.control.testing.laws import NEVER_ENDS, broken, listed, ms
@@ -23,6 +24,12 @@ def default(points: Sequence[str]) -> tuple[str, ...]:
 def target_point(behavior: BlockBehavior) -> str:
     """The sync point at which a behavior is on target, if it has one."""
     return "stroke" if "stroke" in sync_points(behavior) else "end"
+
+
+def until_target(estimate: Estimate, behavior: BlockBehavior) -> Seconds:
+    """Time from the start to the target, as an estimate has it."""
+    points = [phase.to for phase in estimate.phases]
+    return sum(phase.natural for phase in estimate.phases[: points.index(target_point(behavior)) + 1])
 
 
 def times(progress: Sequence[Progress]) -> dict[str, Seconds]:
@@ -102,15 +109,23 @@ class Stage:
         if not self.task.done():
             is_free = self.authority.revoked is None and self.authority.covers(self.authority.points[-1])
             broken(
-                self.behavior,
                 self.next_point,
+                behavior=self.behavior,
                 expected=f"an end within {ms(patience)}{self._cut}",
-                measured=f"it goes on; passed: {listed(self.passed)}; has waited at: {listed(self.waits_at)}",
+                measured=self.told,
                 advice="does `perform` look at the authority while it moves and waits (`watch`, `granted`)?",
                 cause=f"{NEVER_ENDS}, having passed {listed(self.passed)}" if is_free else "",
             )
         self.task.result()
         return self.progress
+
+    @property
+    def told(self) -> str:
+        """Words for what has become of it so far."""
+        is_over = "it has ended" if self.task.done() else "it goes on"
+        how = f" as {self.authority.revoked}" if self.authority.revoked else ""
+        waits = f"; has waited at {listed(self.waits_at)}" if self.waits_at else ""
+        return f"{is_over}{how}; passed {listed(self.passed)}{waits}"
 
     @property
     def next_point(self) -> str:
@@ -146,3 +161,37 @@ async def standing(body: Body, patience: Seconds = PATIENCE) -> bool:
             return False
         await asyncio.sleep(LOOK_EVERY)
     return True
+
+
+class Connection:
+    """A task that a body is connected in: what is entered in a task has to be left in the same."""
+
+    def __init__(self, body: Body) -> None:
+        self._body = body
+        self._is_open = asyncio.Event()
+        self._leave = asyncio.Event()
+        self._task = asyncio.create_task(self._stay(), name="connection of the body")
+
+    async def _stay(self) -> None:
+        async with self._body.connected():
+            self._is_open.set()
+            await self._leave.wait()
+
+    async def enter(self) -> None:
+        opening = asyncio.create_task(self._is_open.wait())
+        await asyncio.wait([opening, self._task], return_when=asyncio.FIRST_COMPLETED)
+        opening.cancel()
+        if self._task.done():
+            self._task.result()
+
+    async def leave(self) -> None:
+        self._leave.set()
+        await self._task
+
+
+async def still_running(before: Set["asyncio.Task[Any]"]) -> list["asyncio.Task[Any]"]:
+    """List tasks that have come since `before`, and do not end by themselves now."""
+    for _ in range(3):
+        await asyncio.sleep(0)
+    came = asyncio.all_tasks() - before - {asyncio.current_task()}
+    return sorted((task for task in came if not task.done()), key=lambda task: task.get_name())

@@ -2,25 +2,41 @@
 
 import asyncio
 import math
-from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
-from typing import Any, ClassVar, NoReturn
+from functools import wraps
+from inspect import signature
+from types import UnionType
+from typing import Any, ClassVar, NoReturn, TypeVar
 
+import numpy as np
 import pytest
 import pytest_asyncio
+from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import (
-    BlockBehavior,
-    Speech,
-)
+from engage_hri.schemas.behavior_types import sync_points
+from engage_hri.schemas.behaviors import BlockBehavior, Gesture, Pointing, Speech
 from engage_hri.schemas.body import BodyPose, Capabilities
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Radians, Seconds, Vector
+from engage_hri.schemas.world import World
 from engage_hri.services.control.contract.body import Body, BodyState
-from engage_hri.services.control.testing.asked import BEHAVIORS, HOLDS, WORLD
-from engage_hri.services.control.testing.cases import Case, Connection, still_running
-from engage_hri.services.control.testing.laws import OTHER_WAY, Finding, LawBroken, angles, broken, degrees
-from engage_hri.services.control.testing.stage import PATIENCE, Stage, standing
+from engage_hri.services.control.testing.asked import AIMED, BEHAVIORS, HOLDS, WORLD
+from engage_hri.services.control.testing.findings import findings_of
+from engage_hri.services.control.testing.laws import (
+    OTHER_WAY,
+    Finding,
+    LawBroken,
+    angles,
+    aside,
+    broken,
+    degrees,
+    listed,
+    ms,
+    named,
+)
+from engage_hri.services.control.testing.motions import Array
+from engage_hri.services.control.testing.stage import PATIENCE, Connection, Stage, default, standing, still_running
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 
 ON_AXIS: Radians = math.radians(1.0)
@@ -28,6 +44,7 @@ STILL: Radians = math.radians(0.1)
 """What a joint that stands still may move all the same."""
 READINGS = 9
 """Readings of which a pose at rest is the middle one, where encoders are noisy."""
+Aimed = TypeVar("Aimed", bound=AIMED)
 PLUGIN = "engage_hri.services.control.testing.plugin"
 
 
@@ -142,31 +159,70 @@ class Suite:
             raise LawBroken([Finding(expected=expected, measured=why, cause=why) for why in sorted(whys)])
         does_not_apply(what)
 
-    def cases(
-        self, body: Body, which: Callable[[BlockBehavior], bool] = lambda _: True, lacks: str = "no such behavior"
-    ) -> "Iterator[Case]":
-        """Judge behaviors one after the other, so that what one of them breaks does not hide the others.
+    def needs(self, body: Body, what: str, *kinds: str) -> None:
+        """End a test that needs all of these types of behaviors, unless the body has them. what: without them."""
+        if not set(kinds) <= set(self.types(body)):
+            self.lacks(body, f"it has no {what}", *kinds)
 
-        which: those that the law is about. lacks: what a body has not got if there are none.
+    async def judge(
+        self,
+        body: Body,
+        law: Callable[[BlockBehavior], Awaitable[None]],
+        which: "Which | UnionType | type",
+        lacks: str,
+    ) -> None:
+        """Judge a law by one behavior after the other, so that what one of them breaks does not hide the others.
 
-        Raises LawBroken after the last one, with all findings.
+        which: behaviors that the law is about, or their types. lacks: what a body has not got if there are none.
+
+        Raises LawBroken after the last one, with all findings; if the law applies to none of them, it says so.
         """
         __tracebackhide__ = True
-        behaviors = [each for each in self.able(body) if which(each)]
+        is_one = (lambda each: isinstance(each, which)) if isinstance(which, UnionType | type) else which
+        behaviors = [each for each in self.able(body) if is_one(each)]
         if not behaviors:
-            unable = [each for each in self.behaviors if type_name(each) in self.unable and which(each)]
+            unable = [each for each in self.behaviors if type_name(each) in self.unable and is_one(each)]
             self.lacks(body, f"it has {lacks}", *map(type_name, unable))
         findings: list[Finding] = []
+        passed: list[BaseException] = []
         for behavior in behaviors:
-            yield Case(body, behavior, findings)
+            try:
+                await law(behavior)
+            except pytest.skip.Exception as skipped:
+                passed.append(skipped)
+            except BaseException as error:
+                if (found := findings_of(error, named(behavior))) is None:
+                    raise
+                findings += found
+                await Stage.end_all()
+                with suppress(Exception):
+                    async with asyncio.timeout(PATIENCE):
+                        await body.home()
         if findings:
             raise LawBroken(findings)
+        if len(passed) == len(behaviors):
+            raise passed[0]
 
     def holds(self, body: Body, behavior: BlockBehavior) -> tuple[str, ...]:
         """List where it can wait; in a speech where the body says so, at marks between two words."""
         if not isinstance(behavior, Speech):
             return HOLDS.get(type_name(behavior), ())
         return tuple(phase.to for phase in body.estimate(behavior, None, self.world).phases if phase.hold)
+
+    def with_one_hand(self, body: Body, behavior: Pointing | Gesture) -> Pointing | Gesture:
+        """Choose a hand for a behavior, so that a second one like it takes over the same arm."""
+        for mode in ("RIGHT_HAND", "LEFT_HAND"):
+            chosen = replace(behavior, mode=mode)
+            if body.estimate(chosen, None, self.world).feasible:
+                return chosen
+        return behavior
+
+    def aims(self, body: Body, behavior: Aimed) -> list[Aimed]:
+        """The same behavior again, and one like it at something else if the body can do that; each with an id."""
+        entities = [each.id for each in self.world.entities if each.id != behavior.target]
+        others = [replace(behavior, id="other", target=each) for each in entities]
+        able = [each for each in others if body.estimate(each, None, self.world).feasible]
+        return [replace(behavior, id="same"), *able[:1]]
 
     def joints(self, body: Body, *behaviors: BlockBehavior) -> set[str]:
         """Names of the joints of the parts that behaviors move; of none: of all parts that any of them moves."""
@@ -179,11 +235,16 @@ class Suite:
         """Half of the time that it takes by itself from here."""
         return sum(phase.natural for phase in body.estimate(behavior, None, self.world).phases) / 2
 
-    def position(self, entity: str) -> Vector:
-        """Look up where an entity of the world is, metres."""
-        found = self.world.entity(entity)
+    def position(self, entity: str, world: World | None = None) -> Vector:
+        """Look up where an entity of the world is, metres. world: None: that of the suite."""
+        found = (world or self.world).entity(entity)
         assert found is not None
         return found.position
+
+    def world_with(self, entity: str, place: Vector) -> World:
+        """The world, with an entity elsewhere."""
+        moved = (replace(each, position=place) if each.id == entity else each for each in self.world.entities)
+        return replace(self.world, entities=tuple(moved))
 
     def note(self, words: str) -> None:
         """Say something of the body that is no breach of the contract."""
@@ -201,6 +262,11 @@ class Suite:
     def gaze_slack(self) -> Radians:
         """Angle by which a reading of a gaze or forearm, through three or four joints, may be off by noise alone."""
         return 12.0 * self.noise
+
+    @property
+    def near(self) -> Radians:
+        """Angle by which eyes may be beside what they are on."""
+        return self.accuracy + self.gaze_slack
 
     @property
     def dwell(self) -> Seconds:
@@ -222,34 +288,86 @@ class Suite:
         seen: Mapping[str, Radians],
         wanted: Mapping[str, Radians],
         joints: Iterable[str],
-        behavior: BlockBehavior,
         sync: str = "",
         *,
         what: str,
-        margin: Radians = 0.0,
-        advice: str = "",
+        behavior: BlockBehavior | None = None,
     ) -> None:
         """Compare two poses. Raises LawBroken with the joint that is farthest off, and `what` was due."""
         off = {joint: abs(seen[joint] - wanted[joint]) for joint in joints if joint in seen and joint in wanted}
-        limit = self.accuracy + self.slack + margin
+        limit = self.accuracy + self.slack
         if off and off[worst := max(off, key=lambda joint: off[joint])] > limit:
             is_mirrored = abs(seen[worst] + wanted[worst]) <= limit < abs(wanted[worst])
             broken(
-                behavior,
                 sync,
-                advice=OTHER_WAY if is_mirrored else advice,
+                behavior=behavior,
+                advice=OTHER_WAY if is_mirrored else "",
                 expected=f"{what}: {worst} at {degrees(wanted[worst])}, within {degrees(limit)}",
                 measured=f"{worst} at {degrees(seen[worst])}",
             )
 
+    def check_eyes(
+        self, body: Body, place: Vector, what: str, sync: str = "", behavior: BlockBehavior | None = None
+    ) -> None:
+        """See that the eyes of a body are on a place. what: is there, in words. Raises LawBroken."""
+        gaze = self.observed(body).gaze
+        if gaze is not None and (off := aside(gaze, place)) > self.near:
+            eyes = f"eyes on {what}, within {degrees(self.near)}"
+            broken(sync, behavior=behavior, expected=eyes, measured=f"{degrees(off)} beside it")
+
+    def check_still(self, samples: Array, joints: Sequence[str], sync: str = "") -> None:
+        """See that joints stand still. samples: their angles, of shape (samples, joints). Raises LawBroken."""
+        moved = np.ptp(samples, axis=0) if samples.size else np.zeros(1)
+        worst, still = int(moved.argmax()), STILL + 2.0 * self.slack
+        if moved[worst] > still:
+            by = f"{joints[worst]} moves by {degrees(float(moved[worst]))} meanwhile"
+            broken(sync, expected=f"joints that stand still, within {degrees(still)}", measured=by)
+
+    def check_passed(self, stage: Stage) -> None:
+        """See that a behavior has passed all of its points, each once and in order. Raises LawBroken."""
+        if default(stage.passed) != (points := sync_points(stage.behavior)):
+            broken(behavior=stage.behavior, expected=listed(points), measured=listed(stage.passed))
+
+    async def check_stands(self, body: Body, sync: str = "", patience: Seconds = PATIENCE) -> None:
+        """See that a body comes to stand. Raises LawBroken."""
+        if not await standing(body, patience):
+            broken(sync, expected=f"a body that stands within {ms(patience)}", measured="`moving` stays true")
+
     async def check_rest(self, body: Body, home: Mapping[str, Radians], behavior: BlockBehavior, what: str) -> None:
         """See that a body comes to stand, at home and silent. Raises LawBroken."""
-        if not await standing(body):
-            broken(behavior, expected=f"that it stands {what}", measured=f"`moving` after {PATIENCE:.0f} s")
-        seen = await self.pose(body)
-        self.check_pose(seen, home, self.joints(body, behavior), behavior, what=f"the safe pose {what}")
+        await self.check_stands(body)
+        self.check_pose(await self.pose(body), home, self.joints(body, behavior), what=f"the safe pose {what}")
         if saying := body.state().speaking:
-            broken(behavior, expected=f"silence {what}", measured=f"`speaking` is {saying!r}")
+            broken(expected=f"silence {what}", measured=f"`speaking` is {saying!r}")
+
+
+Which = Callable[[BlockBehavior], bool]
+Law = Callable[..., Awaitable[None]]
+
+
+def by_each(which: Which | UnionType | type = object, lacks: str = "no such behavior") -> Callable[[Law], Law]:
+    """Make a law of one behavior one of a body: it is judged by each behavior that the body can do.
+
+    The law takes `behavior`; if it takes `home`, too, that is the pose of the body before the first of them.
+
+    which, lacks: as of `Suite.judge`.
+    """
+
+    def of_a_body(law: Law) -> Law:
+        asked = signature(law)
+        own = [each for name, each in asked.parameters.items() if name not in ("behavior", "home")]
+
+        @wraps(law)
+        async def judged(suite: Suite, body: Body, **trial: Any) -> None:
+            __tracebackhide__ = True
+            if "home" in asked.parameters:
+                trial["home"] = await suite.pose(body)
+            await suite.judge(body, lambda behavior: law(suite, body, behavior=behavior, **trial), which, lacks)
+
+        judged.__signature__ = asked.replace(parameters=own)  # type: ignore[attr-defined]  # pytest reads it
+        return judged
+
+    return of_a_body
 
 
 def does_not_apply(why: str) -> NoReturn:

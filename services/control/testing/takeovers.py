@@ -1,17 +1,14 @@
 """Laws of takeovers: a later behavior gets the part, and the earlier one tells no more points."""
 
 import asyncio
-
-from msgspec.structs import replace
+from collections.abc import Sequence
+from itertools import permutations
 
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Pointing
-from engage_hri.schemas.body import Ray
-from engage_hri.schemas.references import type_name
-from engage_hri.services.control.contract.body import Body
-from engage_hri.services.control.testing.laws import broken, degrees, listed
-from engage_hri.services.control.testing.rays import angle, aside
-from engage_hri.services.control.testing.stage import Stage, standing
+from engage_hri.services.control.contract.body import Body, Revocation
+from engage_hri.services.control.testing.laws import angle, broken, degrees, listed
+from engage_hri.services.control.testing.stage import Stage, default, standing
 from engage_hri.services.control.testing.suite import Suite, does_not_apply
 
 
@@ -43,44 +40,35 @@ class TakeoverLaws(Suite):
                     await asyncio.sleep(self.dwell)
                 else:
                     await asyncio.sleep(0.1)
-                may = tuple(one.passed)
+                may = list(one.passed)
                 if "end" in may:
-                    broken(
-                        first,
-                        expected="that it is under way until it is taken over",
-                        measured=f"passed {listed(may)}",
-                    )
+                    what = "that it is under way until it is taken over"
+                    broken(behavior=first, expected=what, measured=one.told)
                 other = Stage(body, later, "end")
                 await other.over()
                 await one.over(1.0)
-                may = may if is_waiting else tuple(one.passed)
-                if one.authority.revoked != "taken_over" or tuple(one.passed) != may or "end" in one.passed:
-                    broken(
-                        first,
-                        expected=f"an end as taken over, having passed {listed(may)}",
-                        measured=f"revoked: {one.authority.revoked}; passed {listed(one.passed)}",
-                    )
-                if tuple(other.passed) != sync_points(later) or other.authority.revoked is not None:
-                    broken(
-                        later,
-                        expected="all of its points: the part is its own",
-                        measured=f"revoked: {other.authority.revoked}; passed {listed(other.passed)}",
-                    )
+                self._check_ended(
+                    one, may if is_waiting else [each for each in one.passed if each != "end"], "taken_over"
+                )
+                self._check_ended(other, sync_points(later))
 
     def _rivals(self, body: Body, kind: str) -> list[tuple[BlockBehavior, BlockBehavior]]:
         """Two behaviors of one type that need the same part; none: the body can't do two."""
         able = []
         for entity in self.world.entities:
-            one: Gaze | Pointing = Gaze(id=f"to {entity.id}", target=entity.id)
+            one: BlockBehavior = Gaze(id=f"to {entity.id}", target=entity.id)
             if kind == "pointing":
-                one = Pointing(id=f"to {entity.id}", target=entity.id, mode="RIGHT_HAND")
-                if not body.estimate(one, None, self.world).feasible:
-                    one = replace(one, mode="LEFT_HAND")
-            able += [one] * body.estimate(one, None, self.world).feasible
-        pairs = [
-            (one, other) for one in able for other in able if one is not other and _share(body, self, one, other)
-        ]
+                one = self.with_one_hand(body, Pointing(id=one.id, target=entity.id))
+            if (estimate := body.estimate(one, None, self.world)).feasible:
+                able.append((one, set(estimate.parts)))
+        pairs = [(one, other) for (one, its), (other, parts) in permutations(able, 2) if its & parts]
         return list(pairs[:1])
+
+    def _check_ended(self, stage: Stage, points: Sequence[str], how: Revocation | None = None) -> None:
+        """See what a behavior has passed in the end, and how it was revoked. Raises LawBroken."""
+        if (default(stage.passed), stage.authority.revoked) != (tuple(points), how):
+            ended = f", as {how}" if how else ""
+            broken(behavior=stage.behavior, expected=f"{listed(points)}, and an end{ended}", measured=stage.told)
 
     async def test_a_shift_takes_nothing_from_a_look_that_lies_over_it(self, body: Body) -> None:
         """A shift beneath a look moves nothing and ends at once; when the look ends, it goes home to there.
@@ -96,18 +84,17 @@ class TakeoverLaws(Suite):
         shift = Stage(body, GazeShift(id="shift", target=there), "end")
         await shift.over()
         await asyncio.sleep(self.dwell)
-        if shift.passed != ["start", "end"] or look.task.done():
-            broken(
-                shift.behavior,
-                expected="start, end, and a look that goes on",
-                measured=f"{listed(shift.passed)}; the look is {look.authority.revoked or 'under way'}",
-            )
-        self._check_same(before, body.state().gaze, shift.behavior)
+        self._check_ended(shift, ("start", "end"))
+        if look.task.done():
+            broken(behavior=look.behavior, expected="a look that goes on over a shift", measured=look.told)
+        after = body.state().gaze
+        if before and after and (off := angle(before.axis, after.axis)) > self.accuracy / 5 + self.gaze_slack:
+            what = "eyes that stay on what a look is at"
+            broken("end", behavior=shift.behavior, expected=what, measured=f"they turn by {degrees(off)}")
         look.authority.extend("end")
         await look.over()
-        if look.passed[-1] != "end":
-            broken(look.behavior, "end", expected="its end", measured=f"passed {listed(look.passed)}")
-        self._check_looks(body, there, look.behavior)
+        self.check_passed(look)
+        self._check_looks(body, there, look)
 
     async def test_a_look_that_comes_over_a_shift_on_its_way_goes_home_to_where_that_leads(self, body: Body) -> None:
         """A look takes the head from a shift that is on its way; the shift ends, for it holds from now on.
@@ -121,11 +108,9 @@ class TakeoverLaws(Suite):
         look = Stage(body, Gaze(id="look", target=first), "end")
         await shift.over()
         await look.over()
-        if shift.passed != ["start", "end"]:
-            broken(shift.behavior, expected="start, end", measured=listed(shift.passed))
-        if tuple(look.passed) != sync_points(look.behavior):
-            broken(look.behavior, expected=listed(sync_points(look.behavior)), measured=listed(look.passed))
-        self._check_looks(body, there, look.behavior)
+        self.check_passed(shift)
+        self.check_passed(look)
+        self._check_looks(body, there, look)
 
     async def test_a_shift_on_its_way_is_taken_over_by_another(self, body: Body) -> None:
         """The later one of two shifts has the head, and the earlier one ends as taken over, without its `end`.
@@ -140,18 +125,12 @@ class TakeoverLaws(Suite):
         other = Stage(body, GazeShift(id="other", target=targets[1]), "end")
         await one.over()
         await other.over()
-        for stage, points, how in ((one, ["start"], "taken_over"), (other, ["start", "end"], None)):
-            if (stage.passed, stage.authority.revoked) != (points, how):
-                broken(
-                    stage.behavior,
-                    expected=f"{listed(points)}; revoked: {how}",
-                    measured=f"{listed(stage.passed)}; revoked: {stage.authority.revoked}",
-                )
-        self._check_looks(body, targets[1], other.behavior)
+        self._check_ended(one, ("start",), "taken_over")
+        self._check_ended(other, ("start", "end"))
+        self._check_looks(body, targets[1], other)
 
     def _needs_looks(self, body: Body) -> None:
-        if not {"gaze", "gazeShift"} <= set(self.types(body)):
-            self.lacks(body, "it has no gaze, or no gazeShift", "gaze", "gazeShift")
+        self.needs(body, "gaze, or no gazeShift", "gaze", "gazeShift")
         if len(self._targets(body)) < 2:
             does_not_apply("there are no two things that it can look at")
 
@@ -165,27 +144,5 @@ class TakeoverLaws(Suite):
                 times[entity.id] = sum(phase.natural for phase in estimate.phases)
         return sorted(times, key=lambda each: -times[each])
 
-    def _check_looks(self, body: Body, target: str, behavior: BlockBehavior) -> None:
-        gaze = self.observed(body).gaze
-        if gaze is not None and (off := aside(gaze, self.position(target))) > self.accuracy + self.gaze_slack:
-            broken(
-                behavior,
-                "end",
-                expected=f"eyes on {target} in the end, within {degrees(self.accuracy + self.gaze_slack)}",
-                measured=f"{degrees(off)} beside it",
-            )
-
-    def _check_same(self, before: Ray | None, after: Ray | None, behavior: BlockBehavior) -> None:
-        if before and after and (off := angle(before.axis, after.axis)) > self.accuracy / 5 + self.gaze_slack:
-            broken(
-                behavior,
-                "end",
-                expected="eyes that stay on what the look is at",
-                measured=f"they turn by {degrees(off)}",
-            )
-
-
-def _share(body: Body, suite: Suite, one: BlockBehavior, other: BlockBehavior) -> bool:
-    """True if two behaviors need the same part."""
-    parts = [set(body.estimate(each, None, suite.world).parts) for each in (one, other)]
-    return type_name(one) == type_name(other) and bool(parts[0] & parts[1])
+    def _check_looks(self, body: Body, target: str, stage: Stage) -> None:
+        self.check_eyes(body, self.position(target), f"{target} in the end", "end", stage.behavior)

@@ -4,7 +4,6 @@ import asyncio
 from collections.abc import Iterator, Sequence
 from random import Random
 
-import numpy as np
 import pytest
 from msgspec.structs import replace
 
@@ -13,12 +12,20 @@ from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.body import Body
-from engage_hri.services.control.testing.laws import Finding, LawBroken, angles, broken, degrees
+from engage_hri.services.control.testing.laws import Finding, LawBroken, angles, broken, degrees, turned
 from engage_hri.services.control.testing.motions import Recording, recorded
 from engage_hri.services.control.testing.playing import Played
 from engage_hri.services.control.testing.predictions import has_joints
-from engage_hri.services.control.testing.stage import LOOK_EVERY, Stage, done, standing, target_point, times
-from engage_hri.services.control.testing.suite import STILL, Suite, does_not_apply, trials
+from engage_hri.services.control.testing.stage import (
+    LOOK_EVERY,
+    Stage,
+    done,
+    standing,
+    target_point,
+    times,
+    until_target,
+)
+from engage_hri.services.control.testing.suite import STILL, Suite, by_each, does_not_apply, trials
 from engage_hri.services.control.testing.witness import CROWDS, Witness, crowded
 
 TRIMMED = 6
@@ -62,65 +69,46 @@ class TruthLaws(Suite):
                 advice=f"state it: `noise = math.radians({float(scatter[worst]) * 57.2958:.2f})`, or --noise",
             )
 
-    async def test_says_that_it_moves_as_long_as_it_moves(self, body: Body) -> None:
+    @by_each(has_joints, "no joints")
+    async def test_says_that_it_moves_as_long_as_it_moves(self, body: Body, behavior: BlockBehavior) -> None:
         """While `moving` is false the joints stand still, within the noise of their encoders.
 
         Usually `moving` is false once the planned time is over: it is for the measured joints to say.
         """
-        for case in self.cases(body, has_joints, "no joints"):
-            async with case as behavior:
-                recording, stands = Recording(self.joints(body, behavior)), []
-                stage = Stage(body, behavior, "end")
-                while not stage.task.done() or body.state().moving:
-                    stands.append(not body.state().moving)
-                    recording.take(body)
-                    await asyncio.sleep(LOOK_EVERY)
-                await stage.over()
-                for first, last in _runs(stands):
-                    samples = recording.angles[first + TRIMMED : max(first, last - TRIMMED)]
-                    moved = samples.max(axis=0) - samples.min(axis=0) if samples.size else np.zeros(1)
-                    if moved.max() > STILL + 2.0 * self.slack:
-                        broken(
-                            behavior,
-                            expected="joints that stand still while `moving` is false",
-                            measured=f"{recording.joints[int(moved.argmax())]} moves by "
-                            f"{degrees(float(moved.max()))} meanwhile",
-                        )
+        recording, stands = Recording(self.joints(body, behavior)), []
+        stage = Stage(body, behavior, "end")
+        while not stage.task.done() or body.state().moving:
+            stands.append(not body.state().moving)
+            recording.take(body)
+            await asyncio.sleep(LOOK_EVERY)
+        await stage.over()
+        for first, last in _runs(stands):
+            self.check_still(recording.angles[first + TRIMMED : max(first, last - TRIMMED)], recording.joints)
 
-    async def test_each_point_is_where_the_joints_are(self, body: Body) -> None:
+    @by_each()
+    async def test_each_point_is_where_the_joints_are(self, body: Body, behavior: BlockBehavior) -> None:
         """Alone, and waiting at each hold point: as each point is told, eyes, forearms and joints are where it says.
 
         Usually a point is told when the planned time is over, or when the vendor's "finished" comes: tell it when the
         measured angles are there. A movement that takes time has moved a joint by its stroke.
         """
-        for case in self.cases(body):
-            async with case as behavior:
-                estimate, joints = body.estimate(behavior, None, self.world), self.joints(body, behavior)
-                before = angles(self.observed(body).pose)
-                witness = Witness(self, body)
-                stage = witness.begin(behavior, "start")
-                for number, hold in enumerate(self.holds(body, behavior), 1):
-                    await stage.holding(number)
-                    stage.authority.extend(hold)
-                if lies := await witness.close():
-                    raise LawBroken(lies)
-                sync = target_point(behavior)
-                points = [phase.to for phase in estimate.phases]
-                takes = sum(phase.natural for phase in estimate.phases[: points.index(sync) + 1])
-                if not joints or not has_joints(behavior) or takes < 0.05:
-                    continue
-                await body.home()
-                async with recorded(body, joints) as recording:
-                    at = times(await done(body, behavior))[sync]
-                there = recording.at(at)
-                moved = max((abs(there[joint] - before[joint]) for joint in joints if joint in before), default=0.0)
-                if moved < 5 * STILL:
-                    broken(
-                        behavior,
-                        sync,
-                        expected=f"a joint that has moved by {degrees(5 * STILL)} at least",
-                        measured=degrees(moved),
-                    )
+        takes = until_target(body.estimate(behavior, None, self.world), behavior)
+        joints, sync = self.joints(body, behavior), target_point(behavior)
+        before = angles(self.observed(body).pose)
+        witness = Witness(self, body)
+        stage = witness.begin(behavior, "start")
+        for number, hold in enumerate(self.holds(body, behavior), 1):
+            await stage.holding(number)
+            stage.authority.extend(hold)
+        if lies := await witness.close():
+            raise LawBroken(lies)
+        if not joints or not has_joints(behavior) or takes < 0.05:
+            return
+        await body.home()
+        async with recorded(body, joints) as recording:
+            at = times(await done(body, behavior))[sync]
+        if (moved := turned(recording.at(at), before)) < 5 * STILL:
+            broken(sync, expected=f"a joint that has moved by {degrees(5 * STILL)} at least", measured=degrees(moved))
 
     @trials(6)
     @pytest.mark.parametrize("crowd", CROWDS)

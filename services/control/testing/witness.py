@@ -26,10 +26,9 @@ from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Meters, Radians, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.contract.body import BehaviorRefused, Body, BodyFailed, BodyState, Progress, Reached
-from engage_hri.services.control.testing.cases import findings_of
-from engage_hri.services.control.testing.laws import Finding, angles, degrees, ms, named
+from engage_hri.services.control.testing.findings import findings_of
+from engage_hri.services.control.testing.laws import Finding, angle, angles, aside, beside, degrees, ms, named
 from engage_hri.services.control.testing.points import PROMPT
-from engage_hri.services.control.testing.rays import angle, aside, beside
 from engage_hri.services.control.testing.stage import PATIENCE, Stage, standing
 from engage_hri.services.control.testing.suite import Suite
 

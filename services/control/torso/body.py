@@ -9,6 +9,8 @@ from contextlib import aclosing
 from math import inf, radians
 from typing import Self
 
+from msgspec import Struct
+
 from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, NoPointZone, Ray
 from engage_hri.schemas.body_faults import KINDS, BodyFault, flaw
@@ -36,18 +38,12 @@ from engage_hri.services.control.figure.alive import Alive
 from engage_hri.services.control.figure.estimates import beneath_a_look, wait_estimate
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.figure.repertoire_files import repertoire_of
+from engage_hri.services.control.figure.tracks import PartTrack
 from engage_hri.services.control.motion.points import WalkPoint
-from engage_hri.services.control.torso import displaced_joints, homing, truth
-from engage_hri.services.control.torso.copy_for_rehearsal import Clock, beside
-from engage_hri.services.control.torso.following import follow, is_behind
-from engage_hri.services.control.torso.idling import idling
-from engage_hri.services.control.torso.measured_state import Measured, measured
 from engage_hri.services.control.torso.mouth import Mouth
-from engage_hri.services.control.torso.postures import is_brief, postures
-from engage_hri.services.control.torso.rehearsal import rehearsed
+from engage_hri.services.control.torso.rehearsal import ClockOfCopy, beside, rehearsed
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
-from engage_hri.services.control.torso.torso import Torso, is_last_on_target
-from engage_hri.services.control.voice import speaking
+from engage_hri.services.control.torso.torso import Torso
 from engage_hri.services.control.voice.estimate import speech_estimate
 from engage_hri.services.control.voice.lipsync import LipSync
 from engage_hri.services.control.voice.timeline import uttered
@@ -60,10 +56,21 @@ ELEMENTS = 256
 """Elements that an estimate with a path counts for (see `steps`)."""
 
 
+class Measured(Struct, frozen=True):
+    """A pose with its rays. angles: of each track."""
+
+    angles: Mapping[str, tuple[float, ...]]
+    pose: BodyPose
+    gaze: Ray
+    left_arm: Ray
+    right_arm: Ray
+
+
 class SimulatedBody(WalkingBody[Run]):
     """A simulated torso with a voice. Behaviors take as long as `estimate` says, but for its faults."""
 
     carries = kinematics.CARRIES
+    moves: Torso
 
     def __init__(
         self,
@@ -83,7 +90,7 @@ class SimulatedBody(WalkingBody[Run]):
         for fault in self._deviations.faults:
             if reason := flaw(fault, self.capabilities):
                 raise InputRefused(Fault(reason=reason, where="control.variability", service="control"))
-        self._torso = Torso(self._loop, zones, repertoire, _displaced(self._deviations.faults))
+        self.moves = Torso(self._loop, zones, repertoire, _displaced(self._deviations.faults))
         self._voice = Voice(is_mute=bool(self._deviations.of("mute")))
         self._occasions = 0
         self._alive = Alive(self._deviations.seed, self._loop.time()) if alive else None
@@ -101,9 +108,11 @@ class SimulatedBody(WalkingBody[Run]):
     # -- the contract -------------------------------------------------------------------------------------------
 
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
-        return self._estimate(self._torso, behavior, pose, world)
+        return self._estimate(self.moves, behavior, pose, world)
 
-    def _estimate(self, torso: Torso, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
+    def _estimate(
+        self, torso: Torso, behavior: BlockBehavior, pose: BodyPose | None, world: World, only: str = ""
+    ) -> Estimate:
         match behavior:
             case Speech() if self._deviations.of("voiceless"):
                 return Impossible("CANNOT_CREATE_BEHAVIOR", "the voice cannot speak").estimate(behavior)
@@ -111,7 +120,7 @@ class SimulatedBody(WalkingBody[Run]):
                 return speech_estimate(behavior, uttered(behavior), torso.pose(world, pose))
             case Wait(duration=duration):
                 return wait_estimate(behavior, duration or 0.0, torso.pose(world, pose))
-        estimate = torso.estimate(behavior, pose, world)
+        estimate = torso.estimate(behavior, pose, world, only)
         is_beneath = pose is None and choreography.is_shift(behavior) and torso.is_overlaid()
         return beneath_a_look(estimate) if is_beneath else estimate
 
@@ -131,68 +140,59 @@ class SimulatedBody(WalkingBody[Run]):
         self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem]
     ) -> Steps[Sequence[Estimate]]:
         """Estimate all as of now, whatever happens between the steps."""
-        clock, told = Clock(self._loop.time()), dict[int, Estimate]()
-        still, is_mine = beside(self._torso, clock, world), type(self).estimate is SimulatedBody.estimate
-        moving = [item for item in items if item.times] if not self._torso.misbelieved else []
+        clock, told = ClockOfCopy(self._loop.time()), dict[int, Estimate]()
+        still, is_mine = beside(self.moves, clock, world), type(self).estimate is SimulatedBody.estimate
+        moving = [item for item in items if item.times] if not self.moves.misbelieved else []
         if moving:
-            going = Clock(clock.at)
-            copy = beside(self._torso, going, world)
+            going = ClockOfCopy(clock.at)
+            copy = beside(self.moves, going, world)
             told |= zip(map(id, moving), (yield from rehearsed(copy, going, moving, others)), strict=True)
-        brief = [item for item in items if is_mine and is_brief(item) and id(item) not in told]
-        told |= zip(map(id, brief), (yield from postures(still, brief, world)), strict=True)
         for item in items:
             if id(item) not in told:
                 asked = (item.behavior, item.pose, world)
-                told[id(item)] = self._estimate(still, *asked) if is_mine else self.estimate(*asked)
+                told[id(item)] = self._estimate(still, *asked, item.only) if is_mine else self.estimate(*asked)
                 yield ELEMENTS
         return [told[id(item)] for item in items]
 
     def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-        match behavior:
-            case Speech():
-                return self._speak(behavior, authority)
-            case Wait():
-                return speaking.wait(behavior, authority)
-            case _:
-                return self.walk(behavior, authority)
+        if isinstance(behavior, Speech):
+            return self._speak(behavior, authority)
+        return super().perform(behavior, authority)
 
     async def home(self, parts: tuple[str, ...] = ()) -> None:
-        going = {part for part in self._torso.tracks if not parts or part.replace("nod", "head") in parts}
         if not parts or "voice" in parts:
             self._voice.hush()
-        for run in dict.fromkeys(run for part, run in self._torso.runs.items() if part in going):
-            going.update(run.course.parts)
-            self._torso.release(run)
-            run.authority.revoke()
-        tracks.rebase(self._torso.tracks, [part for part in going if part != "nod"])
-        if "head" in going:
-            self._torso.attention.stay(tracks.HOME["head"])
-            if self._torso.base is not None:
-                self._torso.base.revoke()
-        self._torso.relax(tuple(sorted(going)))
-        await homing.wait(self._torso, going)
+        await super().home(parts)
 
     def state(self) -> BodyState:
         now = self._loop.time()
-        self._told = told = measured(self._torso.tracks, now, self._told)
+        self._told = told = _measured(self.moves.tracks, now, self._told)
         return BodyState(
             pose=told.pose, gaze=told.gaze, left_arm=told.left_arm, right_arm=told.right_arm,
-            moving=self._voice.is_busy or any(track.is_moving(now) for track in self._torso.tracks.values()),
-            looking_at=self._torso.attention.fixated(now), speaking=self._voice.saying,
+            moving=self._voice.is_busy or any(track.is_moving(now) for track in self.moves.tracks.values()),
+            looking_at=self.moves.attention.fixated(now), speaking=self._voice.saying,
         )  # fmt: skip
 
     def see(self, world: World) -> None:
-        self._torso.world = world
-        follow(self._torso)
+        self.moves.world = world
+        self.moves.follow()
 
     # -- what it does not measure -------------------------------------------------------------------------------
 
     def seen(self) -> Seen | None:
-        by = truth.beside(self._deviations, self._offsets)
-        return truth.seen(tracks.pose_at(self._torso.tracks, self._loop.time()), by) if by else None
+        by = _beside(self._deviations, self._offsets)
+        return seen_with(tracks.pose_at(self.moves.tracks, self._loop.time()), by) if by else None
 
     def ray_at(self, part: str, pose: BodyPose) -> Ray | None:
-        return truth.ray_at(part, pose)
+        angles = tracks.updated(kinematics.HOME, pose)
+        match part:
+            case "head":
+                return kinematics.gaze(angles)
+            case "left_arm":
+                return kinematics.arm(angles, "left")
+            case "right_arm":
+                return kinematics.arm(angles, "right")
+        return None
 
     def calibrate(self, offsets: Mapping[str, Radians]) -> None:
         if unknown := [joint for joint in offsets if kinematics.LIMIT.get(joint) is None]:
@@ -203,7 +203,18 @@ class SimulatedBody(WalkingBody[Run]):
     # -- what belongs to no behavior ----------------------------------------------------------------------------
 
     def idle(self) -> Idle:
-        return idling(self._torso, self._mouth, self._alive, self._loop.time())
+        """Tell of lips with the voice, and of a torso that is alive what it does where nothing else is done."""
+        now, alive = self._loop.time(), self._alive
+        face = self.moves.tracks["face"]
+        expression = dict(zip(face.joints, face.angles(now), strict=True))
+        added = self._mouth.added(now, expression)
+        quick_at = now if self._mouth.is_moving(now) else inf
+        if alive is None:
+            return Idle(added=added, quick_at=quick_at)
+        busy = {part for part, track in self.moves.tracks.items() if track.is_moving(now)} | {*self.moves.runs}
+        by_itself = alive.added(now, expression, face_rests="face" not in busy, body_rests=not busy - {"face"})
+        added = {joint: added.get(joint, 0.0) + by_itself.get(joint, 0.0) for joint in (*added, *by_itself)}
+        return Idle(added=added, quick_at=min(quick_at, alive.quick_at(now)))
 
     def move_lips(self, shapes: Sequence[MouthShape]) -> None:
         self._mouth.move(shapes, self._loop.time())
@@ -216,11 +227,11 @@ class SimulatedBody(WalkingBody[Run]):
 
     def switch_faults(self, faults: Sequence[BodyFault]) -> None:
         on, displaced = _displaced(self.faults), _displaced(faults)
-        if reason := displaced_joints.objection(self._torso, on, displaced):
+        if reason := self.moves.objection_to(on, displaced):
             raise InputRefused(Fault(reason=reason, where="displaced", service="control"))
         self._deviations = Deviations(self._deviations.seed, tuple(faults))
-        displaced_joints.displace(self._torso, on, displaced)
-        self._torso.deviate(self._deviations)
+        self.moves.displace(on, displaced)
+        self.moves.deviate(self._deviations)
         self._voice.is_mute = bool(self._deviations.of("mute"))
         if self._deviations.of("voiceless"):
             self._voice.hush()
@@ -228,53 +239,17 @@ class SimulatedBody(WalkingBody[Run]):
     # -- motion -------------------------------------------------------------------------------------------------
 
     def set_out(self, behavior: BlockBehavior, authority: MovementAuthority) -> Run:
-        if not (choreography.is_shift(behavior) and self._torso.is_overlaid()):
-            return self._begin(behavior, authority)
-        course = choreography.plan(behavior, self._torso.situation(self._torso.world))
-        run = Run(behavior, course, authority, Deviations(), 0)
-        run.is_beneath = True
-        self._torso.set_base(behavior, course, authority)
-        follow(self._torso)
+        course = choreography.plan(behavior, self.moves.situation(self.moves.world, real=True))
+        run = self.moves.set_out(Run(behavior, course, authority, self._deviations, self._occasions + 1))
+        self._occasions += not run.is_beneath
         return run
-
-    def _begin(self, behavior: BlockBehavior, authority: MovementAuthority) -> Run:
-        course = choreography.plan(behavior, self._torso.situation(self._torso.world, real=True))
-        self._occasions += 1
-        run = Run(behavior, course, authority, self._deviations, self._occasions)
-        self._torso.take_over(run, self._torso.path(run.course))
-        return run
-
-    def extend(self, run: Run) -> None:
-        self._torso.extend(run)
-
-    def leave(self, run: Run, point: WalkPoint, *, has_waited: bool) -> Sequence[str]:
-        if has_waited:
-            return self._torso.leave_hold(run, point.held_with)
-        run.pending.pop(0)
-        if is_last_on_target(run.behavior, point.sync):
-            self._torso.leave_target(run)
-        self._torso.attention.follow_run(run, self._loop.time())
-        return [point.sync]
-
-    def owns(self, run: Run) -> bool:
-        return self._torso.owns(run)
-
-    def release(self, run: Run) -> None:
-        self._torso.release(run)
-
-    def abandon(self, run: Run) -> None:
-        self._torso.abandon(run)
 
     def confirm(self, run: Run, sync: str) -> None:
-        if self._torso.is_off_target(run, sync):
+        if self.moves.is_off_target(run, sync):
             raise BodyFailed(_fault(run.behavior, "its target is out of reach where the torso is now"))
 
     def is_behind(self, run: Run) -> bool:
-        return is_behind(self._torso, run)
-
-    def stop(self, run: Run) -> None:
-        super().stop(run)
-        self._torso.attention.expect("", 0.0, self._loop.time())
+        return self.moves.is_behind(run)
 
     async def come(self, run: Run, point: WalkPoint, due: Seconds) -> Seconds | None:
         if point.is_told:
@@ -316,3 +291,48 @@ def _displaced(faults: Sequence[BodyFault]) -> dict[str, float]:
 
 def _fault(behavior: BlockBehavior, reason: str, advice: str = "") -> Fault:
     return Fault(reason=reason, where=behavior.id, advice=advice, service="control")
+
+
+def _measured(parts: Mapping[str, PartTrack], t: Seconds, before: Measured | None = None) -> Measured:
+    """Measure at loop time t.
+
+    before: what was measured last. Often nothing has moved since, and hardly ever everything: what has not is taken
+    from there.
+    """
+    angles = {part: track.angles(t) for part, track in parts.items()}
+    if before is None:
+        moved = set(angles)
+    elif angles == before.angles:
+        return before
+    else:
+        moved = {part for part, at in angles.items() if at != before.angles[part]}
+    pose = tracks.pose_of(parts, angles.values())
+    return Measured(
+        angles,
+        kinematics.pose_message(pose),
+        kinematics.gaze(pose) if before is None or moved & {"torso", "head", "nod"} else before.gaze,
+        kinematics.arm(pose, "left") if before is None or moved & {"torso", "left_arm"} else before.left_arm,
+        kinematics.arm(pose, "right") if before is None or moved & {"torso", "right_arm"} else before.right_arm,
+    )
+
+
+def _beside(deviations: Deviations, offsets: Mapping[str, Radians]) -> dict[str, Radians]:
+    """Angles by which the true ones are more than those that the body tells: miscalibrated, less what is corrected.
+
+    offsets: by which the body corrects what its joints measure.
+    """
+    by = {joint: -offset for joint, offset in offsets.items()}
+    for fault, amount in deviations.of("miscalibrated"):
+        for joint in [limit.joint for limit in kinematics.JOINTS if fault.part in ("", limit.part, limit.joint)]:
+            if kinematics.LIMIT[joint].part != "face":
+                by[joint] = by.get(joint, 0.0) + radians(amount)
+    return {joint: angle for joint, angle in by.items() if angle}
+
+
+def seen_with(told: kinematics.Pose, by: Mapping[str, Radians]) -> Seen | None:
+    """Tell what people see of a body that tells these angles and is so much beside; None: just that."""
+    if not by:
+        return None
+    angles = {joint: angle + by.get(joint, 0.0) for joint, angle in told.items()}
+    arms = kinematics.arm(angles, "left"), kinematics.arm(angles, "right")
+    return Seen(gaze=kinematics.gaze(angles), left_arm=arms[0], right_arm=arms[1])

@@ -13,15 +13,13 @@ from engage_hri.services.control.figure import choreography, tracks
 from engage_hri.services.control.figure.aiming import NECK, Aim
 from engage_hri.services.control.figure.course import Course, Situation
 from engage_hri.services.control.figure.pace import turning_time
-from engage_hri.services.control.figure.tracks import Track
-from engage_hri.services.control.motion.motion import Motion
+from engage_hri.services.control.figure.tracks import PartTrack
 from engage_hri.services.control.motion.path import Leg, Path
 from engage_hri.services.control.torso.runs import Run
+from engage_hri.services.control.torso.table_clearance import SHORTEST
 
 NOTICEABLE = radians(0.5)
 """Radians: a target that moves less does not move the head."""
-SHORTEST: Seconds = 0.1
-"""Least time that is given to catch up with a target."""
 
 
 class Fixation:
@@ -82,18 +80,10 @@ class Fixation:
             self.expect(choreography.eye_target(run.behavior), motion.crossing(marks["end"]), now)
 
 
-def turn(track: Track, goal: tuple[float, ...], now: Seconds, aim: Aim | None) -> None:
+def turn(track: PartTrack, goal: tuple[float, ...], now: Seconds, aim: Aim | None) -> None:
     """Turn the head to `goal`, on the place of `aim`, if it is noticeably elsewhere than where it goes."""
-    if differ(goal, going(track, aim)):
+    if differ(goal, track.going(None if aim is None else aim.trunk)):
         track.return_to(goal, now, aim)
-
-
-def going(track: Track, aim: Aim | None) -> tuple[float, ...]:
-    """Angles at which the head comes to rest, with the trunk where `aim` has it."""
-    rests = track.motion.at(inf).q
-    if aim is not None and track.aim is not None:
-        rests = rests + track.aim.offset(aim.trunk)
-    return tuple(rests.tolist())
 
 
 def way_back(here: tuple[float, ...], base: tuple[float, ...]) -> Leg:
@@ -102,7 +92,7 @@ def way_back(here: tuple[float, ...], base: tuple[float, ...]) -> Leg:
     return Leg(goal=base if seconds else here, seconds=seconds, marks=(("end", 1.0),))
 
 
-def retargeted(run: Run, course: Course, track: Track, now: Seconds) -> Path | None:
+def retargeted(run: Run, course: Course, track: PartTrack, now: Seconds) -> Path | None:
     """Path for the rest of a gaze or shift, on its way or on its target, that has moved; None: not noticeably.
 
     course: to where the target is now.
@@ -115,9 +105,9 @@ def retargeted(run: Run, course: Course, track: Track, now: Seconds) -> Path | N
     return Path(start, run.with_faults(legs), track.limits(now, course.aim))
 
 
-def homeward(run: Run, base: tuple[float, ...], track: Track, now: Seconds, aim: Aim | None) -> Path | None:
+def homeward(run: Run, base: tuple[float, ...], track: PartTrack, now: Seconds, aim: Aim | None) -> Path | None:
     """Path for the rest of a look's way home whose base has moved; None: not noticeably."""
-    if not differ(base, going(track, aim)):
+    if not differ(base, track.going(None if aim is None else aim.trunk)):
         return None
     leg = replace(run.course.legs[-1], goal=base, seconds=_left(run, now))
     return Path(track.start_at(now, aim), run.with_faults((leg,)), track.limits(now, aim))
@@ -142,9 +132,3 @@ def differ(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
 
 def _target(angles: Mapping[str, float]) -> tuple[float, ...]:
     return tuple(angles[joint] for joint in NECK)
-
-
-def brake(motion: Motion, now: Seconds) -> tuple[float, ...]:
-    """Stop `motion`, and return the angles where it comes to rest."""
-    motion.brake(now)
-    return tuple(float(angle) for angle in motion.at(inf).q)

@@ -15,17 +15,16 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, Phase
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.contract.bell import EARLY
+from engage_hri.schemas.world import World
+from engage_hri.services.control.contract.bell import EARLY, Bell
 from engage_hri.services.control.contract.body import MovementAuthority
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.contract.variability import Deviations
 from engage_hri.services.control.figure import choreography, tracks
+from engage_hri.services.control.figure.course import Course
 from engage_hri.services.control.figure.estimates import beneath_a_look
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import Path, resting
-from engage_hri.services.control.torso import following
-from engage_hri.services.control.torso.asked import HURRIED, START, paced_by, told_apart
-from engage_hri.services.control.torso.copy_for_rehearsal import Clock
 from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.control.torso.torso import Torso, is_last_on_target
 from engage_hri.services.runtime.steps import Steps
@@ -42,6 +41,64 @@ PLANNING, LAYING, TELLING, SETTING_OUT = 256, 512, 256, 512
 """Elements of the stages of a beginning, as many as where arms have to be kept clear. The copy stands still there."""
 TRANSPARENT = 1e-6
 """Seconds: changes of a phase that are not worth telling."""
+
+
+START = "start"
+"""Name of the first sync point."""
+HURRIED: Seconds = 0.0005
+"""Seconds by which a point comes too early for a behavior that does not hurry."""
+
+
+class ClockOfCopy(Bell):
+    """An instant that only the rehearsal moves: in place of the loop, and of the bell of each run."""
+
+    def __init__(self, at: Seconds) -> None:
+        self.at = at
+
+    def time(self) -> Seconds:
+        return self.at
+
+    def now(self) -> Seconds:
+        return self.at
+
+    def is_past(self, at: Seconds) -> bool:
+        return self.at >= at - EARLY
+
+    def ring(self) -> None:
+        """Wake nobody: nobody waits."""
+
+
+def beside(torso: Torso, clock: ClockOfCopy, world: World) -> Torso:
+    """A copy of the torso that moves on `clock`; what it does changes nothing of the torso."""
+    motions: dict[int, Motion] = {}
+
+    def copied(motion: Motion) -> Motion:
+        return motions.setdefault(id(motion), copy(motion))
+
+    other = copy(torso)
+    other.clock, other.world, other.attention = clock, world, copy(torso.attention)
+    other.homeward = []
+    other.misbelieved = dict(torso.misbelieved)
+    other.tracks = {part: copy(track) for part, track in torso.tracks.items()}
+    for track in other.tracks.values():
+        track.motion, track.trunk = copied(track.motion), other.tracks["torso"]
+    runs = {id(run): copy(run) for run in torso.runs.values()}
+    for run in runs.values():
+        run.motion, run.bell, run.pending = copied(run.motion), clock, list(run.pending)
+        run.authority, run.gate = _alike(run), inf
+    other.runs = {part: runs[id(run)] for part, run in torso.runs.items()}
+    other.base = None
+    return other
+
+
+def _alike(run: Run) -> MovementAuthority:
+    """An authority like that of `run`, which the rehearsal may revoke."""
+    authority = MovementAuthority(run.behavior, run.authority.through, run.authority.pace)
+    if run.authority.held:
+        authority.hold()
+    if run.authority.revoked is not None:
+        authority.revoke(run.authority.revoked)
+    return authority
 
 
 class _Part:
@@ -67,7 +124,7 @@ class _Part:
         self._most: dict[str, Seconds] = {}
         """Phases that took less, as slow as it could be without a stop."""
 
-    def settle(self, torso: Torso, clock: Clock, now: Seconds) -> Steps[None]:
+    def settle(self, torso: Torso, clock: ClockOfCopy, now: Seconds) -> Steps[None]:
         """Note the points that it has passed by now. At a hold point where it waits it stays."""
         run = self.run
         while run.pending and not run.is_over and not run.holding:
@@ -186,7 +243,7 @@ class _Part:
 
 
 def rehearsed(
-    torso: Torso, clock: Clock, items: Sequence[EstimateItem], others: Sequence[EstimateItem] = ()
+    torso: Torso, clock: ClockOfCopy, items: Sequence[EstimateItem], others: Sequence[EstimateItem] = ()
 ) -> Steps[tuple[Estimate, ...]]:
     """Estimate behaviors as one after the other moves the torso, a copy that `beside` has made; with pauses.
 
@@ -291,7 +348,7 @@ def _go_on(torso: Torso, run: Run, times: Mapping[str, Seconds], passing: Contai
 
 def _begin(
     torso: Torso,
-    clock: Clock,
+    clock: ClockOfCopy,
     item: EstimateItem,
     times: Mapping[str, Seconds],
     passing: Container[str],
@@ -303,8 +360,7 @@ def _begin(
         estimate = torso.estimate(behavior, None, torso.world)
         if estimate.feasible:
             course = choreography.plan(behavior, torso.situation(torso.world))
-            torso.set_base(behavior, course, MovementAuthority(behavior, START))
-            following.follow(torso)
+            torso.set_out(Run(behavior, course, MovementAuthority(behavior, START), Deviations(), 0))
         # Nothing moves: it ends at once, or whenever it is asked to.
         return beneath_a_look(estimate)
     situation = torso.situation(torso.world)
@@ -320,8 +376,8 @@ def _begin(
         yield TELLING
     except Impossible as impossible:
         return impossible.estimate(behavior)
-    waits, forced = told_apart(course, path, times, passing)
-    paced = paced_by(course, path, times, forced)
+    waits, forced = _told_apart(course, path, times, passing)
+    paced = _paced_by(course, path, times, forced)
     authority = MovementAuthority(behavior, _through(behavior, list(waits)), paced)
     run = Run(behavior, course, authority, Deviations(), 0)
     run.bell = clock
@@ -372,3 +428,38 @@ def _through(behavior: BlockBehavior, waits: Sequence[str]) -> str:
 def _before(behavior: BlockBehavior, waits: Sequence[str]) -> Iterator[str]:
     points = MovementAuthority(behavior, START).points
     yield from (points[points.index(sync) - 1] for sync in waits)
+
+
+def _told_apart(
+    course: Course, path: Path, times: Mapping[str, Seconds], passing: Container[str]
+) -> tuple[dict[str, Seconds], dict[str, Seconds]]:
+    """Times of hold points at which it has to wait, and of points for which it hurries or dawdles.
+
+    It hurries to a hold point if it would come there later by itself.
+    """
+    waits: dict[str, Seconds] = {}
+    forced: dict[str, Seconds] = {}
+    before, at = START, times[START]
+    for point in course.points[1:]:
+        if point.sync in times:
+            natural = path.marks[point.sync] - path.marks[before]
+            is_hurried = times[point.sync] - at < natural - HURRIED
+            if point.held_with and not is_hurried and point.sync not in passing:
+                waits[point.held_with] = times[point.sync]
+            else:
+                forced[point.sync] = times[point.sync]
+            before, at = point.sync, times[point.sync]
+    return waits, forced
+
+
+def _paced_by(
+    course: Course, path: Path, times: Mapping[str, Seconds], forced: Mapping[str, Seconds]
+) -> dict[str, Seconds]:
+    """Instants for all points up to the last that is forced: the others are asked for as they come by themselves."""
+    paced: dict[str, Seconds] = {}
+    at = times[START]
+    for since, to in pairwise([point.sync for point in course.points]):
+        if len(forced.keys() & paced.keys()) == len(forced):
+            break
+        at = paced[to] = times.get(to, at + path.marks[to] - path.marks[since])
+    return paced

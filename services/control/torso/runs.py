@@ -5,14 +5,15 @@ from math import inf
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.behaviors import BlockBehavior, Hand, Pointing
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.bases import walk
+from engage_hri.services.control.bases import moving_parts
 from engage_hri.services.control.contract import variability
 from engage_hri.services.control.contract.body import MovementAuthority
 from engage_hri.services.control.contract.variability import Deviations
-from engage_hri.services.control.figure.course import Course
+from engage_hri.services.control.figure import choreography
+from engage_hri.services.control.figure.course import Course, Situation
 from engage_hri.services.control.figure.sizing import hurried
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import Leg, Path, unmarked
@@ -23,7 +24,7 @@ STALL, OVERHEAT = FAULTS = ("(stall)", "(overheat)")
 """Marks on a path where a fault happens; they are never reported."""
 
 
-class Run(walk.Run):
+class Run(moving_parts.Run):
     """A behavior that moves the torso along `course`: in the size and at the rate that it is asked for, with faults.
 
     began: when it was given its parts.
@@ -37,8 +38,7 @@ class Run(walk.Run):
         deviations: Deviations,
         occasion: int,
     ) -> None:
-        super().__init__(behavior, course.points, authority)
-        self.course = course
+        super().__init__(behavior, course, authority)
         self.began: Seconds = inf
         self.is_lost = False
         """True while its target is where it cannot follow."""
@@ -59,7 +59,13 @@ class Run(walk.Run):
     @property
     def is_setting_out(self) -> bool:
         """True if it has not left its target yet. A shift never does."""
-        return self.awaits("stroke_end") or len(self.course.points) == 2
+        return self.awaits("stroke_end") or self.course.stays
+
+    def replanned(self, situation: Situation) -> Course:
+        """The course of a pointing of the same arm, in another situation. Raises Impossible."""
+        assert isinstance(self.behavior, Pointing)
+        hand: Hand = "LEFT_HAND" if self.course.parts == ("left_arm",) else "RIGHT_HAND"
+        return choreography.plan(replace(self.behavior, mode=hand), situation)
 
     def play(self, motion: Motion) -> None:
         self.motion = motion

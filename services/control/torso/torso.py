@@ -1,39 +1,53 @@
-"""The parts of the simulated torso: which behavior has each, and along which path it moves. Nothing waits here.
+"""The parts of the simulated torso: along which paths they move, and what they follow. Nothing waits here.
 
 Time is that of a clock: of the event loop for the body, of its own for a rehearsal.
 """
 
-from collections.abc import Mapping
-from math import inf
+import math
+from collections.abc import Collection, Mapping, Sequence
+from math import degrees, inf, radians
 
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Pointing
 from engage_hri.schemas.body import BodyPose, Estimate, JointLimit, NoPointZone
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Meters, Radians, Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.control.contract.bell import Bell
+from engage_hri.services.control.bases.moving_parts import Clock
 from engage_hri.services.control.contract.body import MovementAuthority
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.contract.variability import Deviations
 from engage_hri.services.control.figure import choreography, kinematics, tracks
 from engage_hri.services.control.figure.aiming import NECK, TRUNK, Aim
 from engage_hri.services.control.figure.course import Course, Situation
-from engage_hri.services.control.figure.estimates import Added, going_home, motion_estimate, poses
+from engage_hri.services.control.figure.estimates import Added, going_home, motion_estimate
 from engage_hri.services.control.figure.laid_paths import laid_path
+from engage_hri.services.control.figure.pace import return_time
 from engage_hri.services.control.figure.repertoire import Repertoire
-from engage_hri.services.control.figure.tracks import Track
+from engage_hri.services.control.figure.tracks import PartTrack
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import JointMotion, Leg, Path, resting
-from engage_hri.services.control.torso import head, reaching, table_clearance
+from engage_hri.services.control.motion.points import WalkPoint
+from engage_hri.services.control.torso import head
 from engage_hri.services.control.torso.head import Fixation
-from engage_hri.services.control.torso.parts import Clock
 from engage_hri.services.control.torso.runs import Run
+from engage_hri.services.control.torso.table_clearance import ARMS, SHORTEST, ClearOfTable, way_along
 from engage_hri.services.runtime.steps import Steps, finished
 
+NOTICEABLE: Meters = 0.01
+"""A target that moves less does not move an arm."""
+BEHIND: Radians = radians(2.0)
+"""Angle by which eyes may be behind a target that moves, and be on it."""
+BESIDE: Meters = 0.03
+"""Distance by which a forearm may be behind it."""
+STEP: Seconds = 0.02
+"""Seconds between two looks at where the trunk will be."""
+Angles = Mapping[str, float]
+"""True angles of displaced joints, radians."""
 
-class Torso:
-    """The parts of a torso. runs: the behavior that has a part, by the part. attention: where the head belongs.
+
+class Torso(ClearOfTable):
+    """The parts of a torso. attention: where the head belongs.
 
     misbelieved: angles at which the body believes joints that are elsewhere.
     """
@@ -41,31 +55,24 @@ class Torso:
     def __init__(
         self, clock: Clock, zones: tuple[NoPointZone, ...], repertoire: Repertoire, displaced: dict[str, float]
     ) -> None:
-        self.clock = clock
+        super().__init__(clock, {name: PartTrack(name, tracks.home_of(name, displaced)) for name in tracks.LIMITS})
         self.zones = zones
         self.repertoire = repertoire
         self.misbelieved = {joint: kinematics.HOME[joint] for joint in displaced}
-        self.tracks = {part: Track(part, tracks.home_of(part, displaced)) for part in tracks.LIMITS}
-        for track in self.tracks.values():
-            track.trunk = self.tracks["torso"]
-        self.runs: dict[str, Run] = {}
-        self.homeward: list[Bell] = []
-        """Bells of those who wait for parts to come home: each behavior that takes parts rings them."""
-        self.world = World(entities=())
         self.attention = Fixation()
-        self.base: MovementAuthority | None = None
-        """Authority of the shift that has set the base gaze."""
 
     # -- planning -----------------------------------------------------------------------------------------------
 
-    def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
-        """Estimate a movement by itself, from `pose` or from where its parts are."""
+    def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World, only: str = "") -> Estimate:
+        """Estimate a movement by itself, from `pose` or from where its parts are. only: what is asked of a look or a
+        point, as of `EstimateItem`."""
         try:
             situation = self.situation(world, pose)
             course = choreography.plan(behavior, situation)
             is_moving = pose is None and not self.misbelieved
             path = self.path(course, None if is_moving else situation)
-            return self.told(behavior, course, path, situation, moving=is_moving)
+            only = only if isinstance(behavior, Gaze | Pointing) else ""
+            return self.told(behavior, course, path, situation, moving=is_moving, only=only)
         except Impossible as impossible:
             return impossible.estimate(behavior)
 
@@ -74,13 +81,14 @@ class Torso:
         return kinematics.pose_message(self.situation(world, pose).pose)
 
     def told(
-        self, behavior: BlockBehavior, course: Course, path: Path, situation: Situation, *, moving: bool = True
-    ) -> Estimate:
+        self, behavior: BlockBehavior, course: Course, path: Path, situation: Situation, *, moving: bool = True,
+        only: str = "",
+    ) -> Estimate:  # fmt: skip
         """Estimate a movement along a path that was laid for it. moving: it begins now, from where its parts are."""
         added = self._added(course) if moving else None
-        estimate = motion_estimate(behavior, course, path, *poses(course, situation.pose), added)
+        estimate = motion_estimate(behavior, course, path, situation.pose, added, only)
         leaves = next((point.sync for point in course.points if is_last_on_target(behavior, point.sync)), "")
-        if added is None or not leaves:
+        if added is None or not leaves or only:
             return estimate
         # The trunk has the part elsewhere by then, so its way home is another one.
         now, run = self.clock.time(), Run(behavior, course, MovementAuthority(behavior, leaves), Deviations(), 0)
@@ -113,7 +121,7 @@ class Torso:
         rest = {**tracks.bases(self.tracks), **self._gaze_at_rest(here)}
         is_sure = real or self.misbelieved.keys().isdisjoint(TRUNK)
         here_only = [[here[joint] for joint in TRUNK]]
-        trunks = table_clearance.places(self, now) if is_sure else table_clearance.way_along(here_only)
+        trunks = self.places(now) if is_sure else way_along(here_only)
         described = Situation(here, rest, world, self.zones, tuple(self.runs), self.repertoire, trunk, trunks)
         return described if pose is None else self.placed(described, pose)
 
@@ -122,7 +130,7 @@ class Torso:
         here, rest = tracks.updated(situation.pose, pose), situation.rest
         if any(here[joint] != situation.pose[joint] for joint in TRUNK):
             rest = {**rest, **self._gaze_at_rest(here)}
-        trunks = table_clearance.way_along([[here[joint] for joint in TRUNK]])
+        trunks = way_along([[here[joint] for joint in TRUNK]])
         return replace(situation, pose=here, rest=rest, trunk=None, trunks=trunks)
 
     def _gaze_at_rest(self, pose: Mapping[str, float]) -> dict[str, float]:
@@ -143,7 +151,7 @@ class Torso:
             return self._path_on_the_move(start, course)
         path = laid_path(start, course)
         if "torso" in course.parts:
-            yield from table_clearance.check(self, course, path, None if situation is None else situation.pose)
+            yield from self.check(course, path, None if situation is None else situation.pose)
         return path
 
     def start(self, course: Course, situation: Situation | None = None) -> JointMotion:
@@ -161,9 +169,9 @@ class Torso:
         """Lay a path to a target while the trunk moves: it arrives when the target is in reach. Raises Impossible."""
         path = laid_path(start, course, is_free=True)
         point = course.arrival
-        if delay := reaching.delay(self, course.aim, self.clock.time() + path.marks[point]):
-            path = laid_path(start, replace(course, legs=reaching.delayed(course.legs, point, delay)), is_free=True)
-        table_clearance.check_carried(self, course, path)
+        if delay := self._delay(course.aim, self.clock.time() + path.marks[point]):
+            path = laid_path(start, replace(course, legs=_delayed(course.legs, point, delay)), is_free=True)
+        self.check_carried(course, path)
         return path
 
     def is_off_target(self, run: Run, sync: str) -> bool:
@@ -174,37 +182,23 @@ class Torso:
 
     # -- motion -------------------------------------------------------------------------------------------------
 
-    def take_over(self, run: Run, path: Path) -> None:
-        """Make `run` the owner of its parts, cut the runs that had them, and start its motion."""
-        finished(self.taken_over(run, path))
+    def take_over(self, run: Run) -> None:
+        finished(self.taken_over(run, self.path(run.course)))
 
     def taken_over(self, run: Run, path: Path) -> Steps[None]:
-        """The same in steps, of a torso that stands still meanwhile."""
+        """The same in steps along a path that is laid, of a torso that stands still meanwhile."""
         run.began = self.clock.time()
         for joint in run.course.joints:
             self.misbelieved.pop(joint, None)
-        left: list[str] = []
-        for earlier in dict.fromkeys(self.runs[part] for part in run.course.parts if part in self.runs):
-            self.release(earlier)
-            if choreography.is_shift(earlier.behavior) and isinstance(run.behavior, Gaze):
-                earlier.is_beneath = True
-            else:
-                earlier.authority.revoke("taken_over")
-            earlier.bell.ring()
-            left += [part for part in earlier.course.parts if part not in run.course.parts]
-        for part in run.course.parts:
-            self.runs[part] = run
-        for bell in self.homeward:
-            bell.ring()
-        if choreography.is_shift(run.behavior):
-            self.set_base(run.behavior, run.course, run.authority)
-        elif isinstance(run.behavior, choreography.SETTLING):
-            tracks.rebase(self.tracks, run.course.parts, run.course.on_target)
+        left = self.take(run)
+        if isinstance(run.behavior, choreography.SETTLING):
+            for track in (self.tracks[name] for name in run.course.parts):
+                track.base = tuple(run.course.on_target[joint] for joint in track.joints)
         self.play(run, path, run.course.aim)
-        self.relax(tuple(left))
+        self.relax(left)
         if "torso" in run.course.parts:
-            reaching.wait_for_reach(self)
-            yield from table_clearance.give_way(self)
+            self._wait_for_reach()
+            yield from self.give_way()
 
     def play(self, run: Run, path: Path, aim: Aim | None) -> None:
         now, run.gate = self.clock.time(), inf
@@ -214,6 +208,15 @@ class Torso:
             self.tracks[part].play(run.motion, column, aim)
             column += len(self.tracks[part].joints)
         self.attention.follow_run(run, now)
+
+    def leave(self, run: Run, point: WalkPoint, *, has_waited: bool) -> Sequence[str]:
+        if has_waited:
+            return self.leave_hold(run, point.held_with)
+        run.pending.pop(0)
+        if is_last_on_target(run.behavior, point.sync):
+            self.leave_target(run)
+        self.attention.follow_run(run, self.clock.time())
+        return [point.sync]
 
     def leave_target(self, run: Run) -> None:
         """Let a part that leaves its target move with the trunk again, or be on the base gaze.
@@ -247,7 +250,7 @@ class Torso:
         leg = _leg_home(run, start, goal)
         path = Path(start, run.with_faults((leg,)), limits)
         if run.course.parts != ("head",):
-            trunks = table_clearance.places(self, at)
+            trunks = self.places(at)
             for above in tracks.raised(tuple(start.q.tolist()), run.course.joints):
                 if not tracks.meets_table(path, run.course.joints, trunks):
                     break
@@ -277,13 +280,7 @@ class Torso:
             self.play(run, path or Path(start, run.with_faults(legs), limits), aim)
         return passed
 
-    def limits(self, run: Run, aim: Aim | None, at: Seconds) -> tuple[JointLimit, ...]:
-        """Limits of a path with this aim that begins then."""
-        is_free = aim is not None and not self.tracks["torso"].is_still(at, aim)
-        return tracks.limits_of(run.course.parts, is_free=is_free)
-
     def extend(self, run: Run) -> None:
-        """Let a behavior go as far and as fast as its authority says now."""
         finished(self.extended(run))
 
     def extended(self, run: Run) -> Steps[None]:
@@ -297,7 +294,7 @@ class Torso:
         run.brake_for_hold(now)
         is_paced = run.keep_pace(now)
         if is_paced:
-            table_clearance.keep_clear(self, run)
+            self.keep_clear(run)
         if is_paced or is_extended:
             self.attention.follow_run(run, now)
 
@@ -308,60 +305,177 @@ class Torso:
             run.deviate(deviations, now)
             self.attention.follow_run(run, now)
 
-    def owns(self, run: Run) -> bool:
-        return any(owner is run for owner in self.runs.values())
-
-    def release(self, run: Run) -> None:
-        for part in [part for part, owner in self.runs.items() if owner is run]:
-            del self.runs[part]
-
     def abandon(self, run: Run) -> None:
-        """Send the parts of `run` to rest. A shift of the head that is broken off stays where it can stop."""
         if choreography.is_shift(run.behavior):
             self._stay(run)
             self.attention.expect("", 0.0, self.clock.time())
         else:
             if isinstance(run.behavior, choreography.SETTLING):
-                tracks.rebase(self.tracks, run.course.parts)
+                self.rebase(run.course.parts)
             self.relax(run.course.parts)
 
     def _stay(self, run: Run) -> None:
         """Stop a shift of the head, and make the direction where it stops the base gaze."""
         now, track = self.clock.time(), self.tracks["head"]
-        goal = head.brake(run.motion, now)
+        run.motion.brake(now)
+        goal = track.going()
         if track.aim is not None and not track.is_still(now, track.aim):
             goal = tuple((track.aim.offset(track.trunk.angles(run.motion.end)) + goal).tolist())
-            leg = Leg(goal=goal, seconds=max(run.motion.end - now, head.SHORTEST))
+            leg = Leg(goal=goal, seconds=max(run.motion.end - now, SHORTEST))
             track.play(Motion(Path(track.at(now), (leg,), tracks.LIMITS["head"]), now))
         track.aim = None
         self.attention.stay(goal)
 
-    def relax(self, parts: tuple[str, ...]) -> None:
+    def relax(self, names: Collection[str]) -> None:
         now = self.clock.time()
         # The trunk first: arms are not down before it is up.
-        for part in sorted(parts, key=lambda part: part != "torso"):
+        for part in sorted(names, key=lambda part: part != "torso"):
             track = self.tracks[part]
             if part == "head":
                 track.return_to(self.attention.angles, now, self.attention.aim)
                 self.attention.expect(self.attention.entity, track.motion.end, now)
             else:
-                track.return_to(track.base, now, trunks=table_clearance.places(self, now))
-        if "torso" in parts:
-            reaching.wait_for_reach(self)
-            finished(table_clearance.give_way(self))
+                track.return_to(track.base, now, trunks=self.places(now))
+        if "torso" in names:
+            self._wait_for_reach()
+            finished(self.give_way())
 
-    # -- gaze ---------------------------------------------------------------------------------------------------
+    def stop(self, run: Run) -> None:
+        super().stop(run)
+        self.attention.expect("", 0.0, self.clock.time())
 
-    def is_overlaid(self) -> bool:
-        return "head" in self.runs and isinstance(self.runs["head"].behavior, Gaze)
+    # -- targets that move ----------------------------------------------------------------------------------------
 
-    def set_base(self, behavior: BlockBehavior, course: Course, authority: MovementAuthority) -> None:
-        """Make the goal of a shift the direction to which the head returns. A shift before it that has not ended is
-        taken over."""
-        if self.base is not None:
-            self.base.revoke("taken_over")
-        self.attention.shift(behavior, course)
-        self.base = authority
+    def rest_on(self, run: Run | None) -> None:
+        if run is None:
+            self.attention.stay(tracks.HOME["head"])
+        else:
+            self.attention.shift(run.behavior, run.course)
+
+    def follow(self) -> None:
+        """Turn head and arms to follow the entities that they are on, or on their way to."""
+        self._follow_with_head()
+        for part in ARMS:
+            run = self.runs.get(part)
+            if run is not None and isinstance(run.behavior, Pointing) and run.awaits("stroke_end"):
+                self._follow_with_arm(run)
+
+    def _follow_with_head(self) -> None:
+        now, situation, track = self.clock.time(), self.situation(self.world, real=True), self.tracks["head"]
+        self.attention.update(situation)
+        aim = self.attention.aim
+        if (run := self.runs.get("head")) is None:
+            head.turn(track, self.attention.angles, now, aim)
+            return
+        try:
+            course = choreography.plan(run.behavior, situation)
+        except Impossible:
+            run.is_lost = self.world.entity(run.behavior.target) is not None  # type: ignore[union-attr]
+            return
+        run.is_lost = False
+        path: Path | None = None
+        if run.holding or run.awaits("stroke") or choreography.is_shift(run.behavior):
+            path, aim = head.retargeted(run, course, track, now), course.aim
+            run.course = course if path is not None else run.course
+        elif not run.awaits("relax"):
+            path = head.homeward(run, self.attention.angles, track, now, aim)
+        if path is not None:
+            self.play(run, path, aim)
+            run.bell.ring()
+
+    def _follow_with_arm(self, run: Run) -> None:
+        assert isinstance(run.behavior, Pointing)
+        assert run.course.aim is not None
+        entity, now = self.world.entity(run.behavior.target), self.clock.time()
+        if entity is None:
+            return  # It was last seen where the arm points.
+        if math.dist(entity.position, run.course.aim.target) < NOTICEABLE:
+            run.is_lost = False
+            return
+        try:
+            course = run.replanned(self.situation(self.world, real=True))
+        except Impossible:
+            run.is_lost = True
+            return
+        path = self.relaid(run, course, now)
+        run.is_lost = path is None or tracks.meets_table(path, course.joints, course.trunks[:1])
+        if path is not None and not run.is_lost:
+            run.course = course
+            self.play(run, path, course.aim)
+            run.bell.ring()
+
+    def is_behind(self, run: Run) -> bool:
+        """True if a behavior that waits on its target is still on its way to where that has moved."""
+        now, aim = self.clock.time(), run.course.aim
+        if aim is None or now >= run.motion.end or not isinstance(run.behavior, Gaze | Pointing):
+            return False
+        if isinstance(run.behavior, Pointing) and run.pending[0].sync != "stroke_end":
+            return False
+        pose = tracks.pose_at({part: self.tracks[part] for part in ("torso", *run.course.parts)}, now)
+        if aim.side is None:
+            on = aim.angles(self.tracks["torso"].angles(now))
+            return any(abs(pose[joint] - angle) > BEHIND for joint, angle in zip(aim.joints, on, strict=True))
+        forearm = kinematics.arm(pose, aim.side)
+        way = [there - here for there, here in zip(aim.target, forearm.origin, strict=True)]
+        along = sum(a * b for a, b in zip(way, forearm.axis, strict=True))
+        return math.dist(way, [along * each for each in forearm.axis]) > BESIDE
+
+    def _delay(self, aim: Aim | None, at: Seconds) -> Seconds:
+        """Seconds from that instant on until the target comes into reach as the trunk moves; 0: it is, or never."""
+        trunk = self.tracks["torso"]
+        for step in range(1 + max(0, math.ceil((trunk.motion.end - at) / STEP))):
+            if aim is None or aim.is_in_reach(trunk.angles(at + step * STEP)):
+                return step * STEP
+        return 0.0
+
+    def _wait_for_reach(self) -> None:
+        """Delay what is on its way to a target that is not in reach by then, since the trunk moves otherwise."""
+        now = self.clock.time()
+        for run in dict.fromkeys(self.runs.values()):
+            point = run.course.arrival
+            if run.course.aim is None or run.is_over or not run.awaits(point):
+                continue
+            at = run.motion.crossing(run.motion.path.marks[point])
+            if at is not None and at > now and (late := self._delay(run.course.aim, at)):
+                track = self.tracks[run.course.parts[0]]
+                left = run.motion.path.after(run.motion.s(now), [each.sync for each in run.pending])
+                start, legs = track.start_at(now, run.course.aim), _delayed(left, point, late)
+                path = Path(start, run.with_faults(legs), self.limits(run, run.course.aim, now))
+                self.play(run, path, run.course.aim)
+                run.bell.ring()
+
+    # -- faults -------------------------------------------------------------------------------------------------
+
+    def objection_to(self, on: Angles, angles: Angles) -> str:
+        """Say why these joints cannot be displaced now; empty: they can. on: those that are already."""
+        now, new = self.clock.time(), _new(on, angles)
+        for joint, angle in new.items():
+            limit = kinematics.LIMIT[joint]
+            part = limit.part.replace("_", " ")
+            if joint not in self.tracks[limit.part].joints:
+                return f"{joint} cannot be displaced: it is at rest where it adds nothing"
+            if not limit.low <= angle <= limit.high:
+                low, high = degrees(limit.low), degrees(limit.high)
+                return f"{joint} cannot be displaced to {degrees(angle):.0f} degrees: expected {low:.0f}..{high:.0f}"
+            if limit.part in self.runs or self.tracks[limit.part].is_moving(now):
+                return f"{joint} cannot be displaced: the {part} moves; it can be while it rests"
+        if new and kinematics.touches_table({**tracks.pose_at(self.tracks, now), **new}):
+            return "joints cannot be displaced so: an arm would touch the table"
+        return ""
+
+    def displace(self, on: Angles, angles: Angles) -> None:
+        """Displace exactly these joints. Of one that is displaced no more the torso knows again where it is."""
+        now, new = self.clock.time(), _new(on, angles)
+        for part in dict.fromkeys(kinematics.LIMIT[joint].part for joint in new):
+            track = self.tracks[part]
+            here = dict(zip(track.joints, track.angles(now), strict=True))
+            moved = {joint: angle for joint, angle in new.items() if joint in here}
+            self.misbelieved |= {joint: self.misbelieved.get(joint, here[joint]) for joint in moved}
+            goal = tuple((here | moved).values())
+            leg = Leg(goal=goal, seconds=return_time(list(here.values()), goal))
+            track.play(Motion(Path(resting(list(here.values())), (leg,), track.own_limits), now))
+        known = [joint for joint in on if joint not in angles and self.misbelieved.pop(joint, None) is not None]
+        self.relax(tuple(dict.fromkeys(kinematics.LIMIT[joint].part for joint in known)))
 
 
 def is_last_on_target(behavior: BlockBehavior, sync: str) -> bool:
@@ -375,3 +489,12 @@ def _leg_home(run: Run, start: JointMotion, goal: tuple[float, ...]) -> Leg:
     """Leg from a target to where the part belongs."""
     here = tuple(start.q.tolist())
     return head.way_back(here, goal) if run.course.parts == ("head",) else choreography.lowering(here, goal)
+
+
+def _delayed(legs: Sequence[Leg], sync: str, by: Seconds) -> tuple[Leg, ...]:
+    """Legs of which the one that ends in `sync` takes longer."""
+    return tuple(replace(leg, seconds=leg.seconds + by) if sync in dict(leg.marks) else leg for leg in legs)
+
+
+def _new(on: Angles, angles: Angles) -> dict[str, float]:
+    return {joint: angle for joint, angle in angles.items() if on.get(joint) != angle}

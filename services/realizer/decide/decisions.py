@@ -22,9 +22,8 @@ from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.net.stops import NO_STOPS, Stops
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.promises import Broken, promises_of
+from engage_hri.services.realizer.plan.promises import Broken, Promises
 from engage_hri.services.realizer.points import ORIGIN, Point, performer
-from engage_hri.services.runtime.steps import finished
 
 
 class Decisions:
@@ -68,7 +67,7 @@ class Decisions:
         """Go on with another plan of the same block, from the same facts: something was dropped."""
         self.plan = plan
         self.net = net = RunningNet(plan.net, plan.members, plan.at, (self.foresight, self.grants))
-        self.promises = finished(promises_of(plan.relations))
+        self.promises = Promises(plan.relations)
         for point in self.facts.reached.keys() | {ORIGIN}:
             self.promises.come(point, self.facts.reached.get(point, self.began))
         self.foresight.look_ahead(plan, net)

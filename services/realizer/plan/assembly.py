@@ -26,7 +26,6 @@ from engage_hri.services.realizer.points import (
     gate_point,
     performer,
 )
-from engage_hri.services.runtime.steps import PORTION, Steps, portions
 
 
 class Assembly(Struct, frozen=True):
@@ -60,7 +59,7 @@ class Assembly(Struct, frozen=True):
 
 
 class Assembler:
-    """Makes the net of a block; `assembling` prepares one.
+    """Makes the net of a block.
 
     chains: in document order. waited_for: behaviors that the end of the block waits for.
     """
@@ -73,23 +72,16 @@ class Assembler:
         self.classes = classes
         self.waited_for = waited_for
         self.waived: set[tuple[str, str]] = set()
-
-    def prepare(self) -> Steps[None]:
-        """Compute all that does not depend on an arrangement."""
-        chains, relations = self.chains, self.relations
+        # All that does not depend on an arrangement.
         foreign = sorted(point for point in relations.named if ":" in point.behavior)
         own = [point for id in sorted(chains) for point in chains[id].points]
         self.placed = relations.placed
-        found = yield from instants(self.classes, [ORIGIN, *foreign, *own])
+        found = instants(self.classes, [ORIGIN, *foreign, *own])
         # The start of the block first; the others keep their canonical order.
         found.sort(key=lambda instant: ORIGIN not in instant.points)
         self.size = len(found)
         self.at = {point: number for number, instant in enumerate(found) for point in instant.points}
-        self.members: list[tuple[Member, ...]] = []
-        for portion in portions(found):
-            self.members += [self._members(instant.points) for instant in portion]
-            yield len(portion)
-        yield len(found) // 8
+        self.members = [self._members(instant.points) for instant in found]
         self.kinds = {
             (each.behavior, number): each.kind for number, members in enumerate(self.members) for each in members
         }
@@ -99,32 +91,24 @@ class Assembler:
         ]
         self.places: list[Place] = []
         self.bounds: list[Bound] = []
-        yield len(found) // 8
         self._class_delays(found)
-        for orders in portions(relations.orders):
-            for relation in orders:
-                self._order(relation)
-            yield len(orders)
+        for relation in relations.orders:
+            self._order(relation)
         self._foreign = frozenset(self.at[point] for point in foreign)
         self._fixed = (self.places, self.bounds)
 
-    def assemble(self, arrangement: Arrangement) -> Steps[Assembly]:
+    def assemble(self, arrangement: Arrangement) -> Assembly:
         """The net for this arrangement."""
         self.arrangement = arrangement
         places, bounds = self._fixed
         self.places, self.bounds = list(places), list(bounds)
-        for portion in portions(sorted(self.chains)):
-            for id in portion:
-                self._phases(self.chains[id])
-            yield 4 * len(portion)
+        for id in sorted(self.chains):
+            self._phases(self.chains[id])
         self._series()
-        yield 2 * len(self.chains)
         self._arranged()
-        yield len(self.arrangement.lasting) * len(self.chains) // 8
-        yield from self._never_too_soon()
+        self._never_too_soon()
         self._ending(self.size)
-        yield 2 * len(self.chains)
-        return (yield from self._in_firing_order())
+        return self._in_firing_order()
 
     def _members(self, points: tuple[Point, ...]) -> tuple[Member, ...]:
         if len(points) == 1 and (alone := self.chains.get(points[0].behavior)):
@@ -278,16 +262,14 @@ class Assembler:
         if source != target:
             self.places.append(Place(kind, source, target, seconds, seconds, behavior, lines, after))
 
-    def _never_too_soon(self) -> Steps[None]:
+    def _never_too_soon(self) -> None:
         """Make sure of orders on points that cannot wait: the behavior waits where it last can before such a point.
 
         Prediction must do instead if the awaited one waits for it in turn, if there is no time, or if others of the
         instant wait for another block. (Words after that block's words do not wait for a stroke, too.)
         """
         waits = []
-        for number, place in enumerate(self.places):
-            if not number % PORTION:
-                yield PORTION // 4
+        for place in self.places:
             if place.source in self._foreign and any(each.kind != "passive" for each in self.members[place.target]):
                 continue
             if place.kind == "order" and place.source != 0:
@@ -303,10 +285,8 @@ class Assembler:
         out: dict[int, list[int]] = {}
         for place in (*self.places, *waits):
             out.setdefault(place.source, []).append(place.target)
-        yield len(self.places) // 32
-        groups = yield from components(self.size, out)
+        groups = components(self.size, out)
         circle = {each: number for number, group in enumerate(groups) for each in group}
-        yield len(self.places) // 32
         self.places += [place for place in waits if circle[place.source] != circle[place.target]]
 
     def _name(self, transition: int) -> str:
@@ -345,30 +325,21 @@ class Assembler:
         self.places += [Place("order", each, end) for each in range(end) if each not in left]
         self.places.append(Place("idle", end, 0))
 
-    def _in_firing_order(self) -> Steps[Assembly]:
-        net, ranked, is_ordered = yield from numbered(self.transitions, self.places, self.bounds)
+    def _in_firing_order(self) -> Assembly:
+        net, ranked, is_ordered = numbered(self.transitions, self.places, self.bounds)
         number = {old: new for new, old in enumerate(ranked)}
         at = {point: number[each] for point, each in self.at.items()}
         members = tuple([self.members[each] if each < self.size else () for each in ranked])
         return Assembly(prolonged(net, members, self.chains, self.arrangement.stops), is_ordered, at, members)
 
-    def circles(self) -> Steps[list[list[Point]]]:
+    def circles(self) -> list[list[Point]]:
         """Points that wait for each other in a circle of no length, so are one instant: circular synchronization."""
         out: dict[int, list[int]] = {}
         for place in self.places:
             if place.kind != "idle" and place.shortest <= EPSILON:
                 out.setdefault(place.source, []).append(place.target)
-        yield len(self.places) // 16
-        groups = [group for group in (yield from components(len(self.transitions), out)) if len(group) > 1]
+        groups = [group for group in components(len(self.transitions), out) if len(group) > 1]
         return [[self.transitions[each].points[0] for each in group if each < self.size] for group in groups]
-
-
-def assembling(
-    chains: Mapping[str, Chain], relations: Relations, classes: Classes, waited_for: frozenset[str]
-) -> Steps[Assembler]:
-    assembler = Assembler(chains, relations, classes, waited_for)
-    yield from assembler.prepare()
-    return assembler
 
 
 def _lines(*lines: int) -> tuple[int, ...]:

@@ -6,14 +6,12 @@ from engage_hri.services.realizer.plan.known import Known
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.promises import broken_by
 from engage_hri.services.realizer.plan.relations import Relations
-from engage_hri.services.runtime.steps import Steps
 
 
-def compared(plan: Plan, said: Relations, known: Known) -> Steps[Plan]:
+def compared(plan: Plan, said: Relations, known: Known) -> Plan:
     """The plan with what it cannot keep of what the block says, and a copy of that: it has worked out nothing."""
     if not (known.points or plan.late):
         return replace(plan, relations=replace(plan.relations))
     times = known.with_own({point: plan.schedule[at] for point, at in plan.at.items()})
-    yield len(times) // 4
-    broken = yield from broken_by(said, times)
+    broken = broken_by(said, times)
     return replace(plan, relations=replace(said), broken=tuple(broken))

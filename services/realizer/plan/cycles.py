@@ -2,22 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 
-from engage_hri.services.runtime.steps import PORTION, Steps
 
-
-def components(size: int, out: Mapping[int, Sequence[int]]) -> Steps[list[list[int]]]:
+def components(size: int, out: Mapping[int, Sequence[int]]) -> list[list[int]]:
     """The strongly connected components of a graph of `size` nodes. Kosaraju, without recursion."""
     into: dict[int, list[int]] = {}
-    for number, (source, targets) in enumerate(out.items()):
+    for source, targets in out.items():
         for target in targets:
             into.setdefault(target, []).append(source)
-        if not number % PORTION:
-            yield PORTION // 2
     groups = []
     taken = bytearray(size)
-    for number, root in enumerate(reversed((yield from _left(size, out)))):
-        if not number % PORTION:
-            yield PORTION // 2
+    for root in reversed(_left(size, out)):
         if taken[root]:
             continue
         taken[root] = 1
@@ -31,7 +25,7 @@ def components(size: int, out: Mapping[int, Sequence[int]]) -> Steps[list[list[i
     return groups
 
 
-def _left(size: int, out: Mapping[int, Sequence[int]]) -> Steps[list[int]]:
+def _left(size: int, out: Mapping[int, Sequence[int]]) -> list[int]:
     """Nodes in the order in which a depth-first search leaves them."""
     finished: list[int] = []
     seen = bytearray(size)
@@ -48,6 +42,4 @@ def _left(size: int, out: Mapping[int, Sequence[int]]) -> Steps[list[int]]:
             else:
                 finished.append(here)
                 stack.pop()
-                if not len(finished) % PORTION:
-                    yield PORTION // 2
     return finished

@@ -11,7 +11,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
 from engage_hri.services.realizer.plan.assembly import Assembly
-from engage_hri.services.realizer.plan.given_up import times_of
+from engage_hri.services.realizer.plan.given_up import Times
 from engage_hri.services.realizer.plan.handover import Turn
 from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.phases import Chain
@@ -32,7 +32,6 @@ from engage_hri.services.realizer.plan.words import (
     way_round,
 )
 from engage_hri.services.realizer.points import EPSILON, Point
-from engage_hri.services.runtime.steps import Steps
 
 FACES = types_with(family="face", lasts=True)
 
@@ -69,7 +68,7 @@ def clashes(
     classes: Classes,
     times: Mapping[Point, Seconds] = {},
     spelling: Spelling = AS_IN_DRAFTS,
-) -> Steps[list[Loss]]:
+) -> list[Loss]:
     """Losses by turns that cannot be waited for, whatever the rest of the block: ties leave no time for both.
 
     times: of points, from the start of the block, as far as they are known.
@@ -79,7 +78,6 @@ def clashes(
     stays: dict[str, str] = {}
     """For each lost behavior, the one that keeps the part instead."""
     for later, (earlier, sync) in sorted(turns, key=lambda turn: (rank[turn[0]], rank[turn[1].behavior])):
-        yield 16
         if (stayed := stays.get(earlier, earlier)) != earlier:
             # Of another type, perhaps, without that point.
             earlier, sync = stayed, next((each.sync for each in chains[stayed].points if each.sync == sync), "end")
@@ -135,7 +133,7 @@ def judge(
     block: str,
     turns: Collection[Turn],
     spelling: Spelling = AS_IN_DRAFTS,
-) -> Steps[Losses | BlockRefused]:
+) -> Losses | BlockRefused:
     """The losses of impossible circles, or the refusal of the block.
 
     A time that cannot be met costs a behavior, a speech only if there is no other, and of several the later in the
@@ -143,26 +141,21 @@ def judge(
     Each circle costs a behavior, unless one that is lost already was part of it.
     """
     net = assembly.net
-    yield len(relations.equals) // 2
     case = _Case(net, chains, lines_by_point(relations), spelling)
     rank = {id: number for number, id in enumerate(chains) if id not in relations.required}
     ends = by_ends(turns, assembly.at)
     found = []
     for circle in impossible.circles:
         found.append((_loss(circle, case, rank, ends), circle))
-        yield 4 + 2 * len(circle)
     losses: dict[str, Loss] = {}
     for loss, circle in sorted(found, key=lambda each: rank[each[0].behavior] if each[0] else -1):
-        yield len(circle)
         if loss is not None and not _touched(circle, net) & losses.keys():
             losses[loss.behavior] = loss
     if losses:
         return Losses(tuple(losses.values()))
     everybody = {id: number for number, id in enumerate(chains)}
     if (loss := _loss(impossible.circles[0], case, everybody, ends)) is not None:
-        times = yield from times_of(
-            {loss.behavior}, replace(relations, required=relations.required - {loss.behavior})
-        )
+        times = Times(replace(relations, required=relations.required - {loss.behavior}), {loss.behavior})
         own = [point for point in loss.points if point.behavior == loss.behavior]
         given_up = times.give_up(own, loss.among, ())
         otherwise = f"{given_up[1]} would be given up, and its words said" if given_up else "it would be dropped"

@@ -6,31 +6,25 @@ from msgspec.structs import replace
 
 from engage_hri.services.realizer.plan.relations import Equal, Order, Relations
 from engage_hri.services.realizer.points import Point
-from engage_hri.services.runtime.steps import Steps, portions
 
 
 class Times:
     """The relations of a block, of which some that place its speeches are given up."""
 
-    def __init__(self, relations: Relations) -> None:
+    def __init__(self, relations: Relations, speeches: Container[str]) -> None:
+        """speeches: those whose times may be given up."""
         self._relations = relations
         self._equals: dict[int, Equal | None] = dict(enumerate(relations.equals))
         """By number; None: given up. The numbers of the orders are negative."""
         self._orders: dict[int, Order | None] = {-n: order for n, order in enumerate(relations.orders, 1)}
         self._naming: dict[Point, list[int]] = {}
         """Numbers of the relations that name a point."""
-
-    def read(self, speeches: Container[str]) -> Steps[None]:
-        """Find what names points of the speeches."""
         named = [(n, [term.point for term in each.terms]) for n, each in enumerate(self._relations.equals)]
         named += [(-n, [each.earlier.point, each.later.point]) for n, each in enumerate(self._relations.orders, 1)]
-        yield len(named)
-        for portion in portions(named):
-            for number, points in portion:
-                for point in dict.fromkeys(points):
-                    if point.behavior in speeches:
-                        self._naming.setdefault(point, []).append(number)
-            yield len(portion)
+        for number, points in named:
+            for point in dict.fromkeys(points):
+                if point.behavior in speeches:
+                    self._naming.setdefault(point, []).append(number)
 
     def give_up(
         self, points: Sequence[Point], among: Container[Point], dropped: Container[str]
@@ -87,10 +81,3 @@ class Times:
         equals = tuple([each for each in self._equals.values() if each is not None])
         orders = tuple([each for each in self._orders.values() if each is not None])
         return replace(self._relations, equals=equals, orders=orders)
-
-
-def times_of(speeches: Container[str], relations: Relations) -> Steps[Times]:
-    """Relations that place these speeches: nothing else can be given up."""
-    times = Times(relations)
-    yield from times.read(speeches)
-    return times

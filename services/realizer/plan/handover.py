@@ -19,7 +19,6 @@ from engage_hri.services.realizer.plan.instants import Classes
 from engage_hri.services.realizer.plan.phases import ARMS, Chain
 from engage_hri.services.realizer.plan.relations import Relations
 from engage_hri.services.realizer.points import EPSILON, ON_TARGET, SHIFTS, WITH_STROKE, Point
-from engage_hri.services.runtime.steps import Steps
 
 _OTHER: Mapping[str, tuple[str, Hand]] = {
     arm: (parts[0], hand)
@@ -162,29 +161,24 @@ def arrange(
     rounds: Mapping[Point, int],
     hands: Hands,
     begun: Container[str] = (),
-) -> Steps[tuple[Arrangement, list[Conflict]]]:
+) -> tuple[Arrangement, list[Conflict]]:
     """The arrangement for a schedule that was made with `before`, and conflicts where it breaks what was asked for.
 
     rounds: order of points that come at one time. hands: those that behaviors use, and are given here. begun:
     behaviors that have begun: they wait for nobody any more, and use the arm that they have.
     """
     held, awaited = relations.held, relations.awaited
-    yield len(relations.orders) // 8
     mentioned = {point.behavior for point in relations.constrained}
     successors, cuts = dict(before.successors), dict(before.cuts)
     handovers: dict[str, tuple[Handover, ...]] = {}
     conflicts = []
-    yield len(chains) // 4
     ranked = entering(chains, mentioned, times, rounds, before.ranked, begun)
-    yield len(chains) // 4
     users = _users(chains, ranked)
     beneath = frozenset(_overlaid(chains, users, times))
     for id in [id for id in cuts if chains[id].type in SHIFTS and id not in successors and id not in beneath]:
         del cuts[id]  # The look that it lay beneath ends before it, by now.
     cuts.update(dict.fromkeys(beneath, 0))
-    yield len(chains) // 4
     for id, takers in _takers(chains, ranked, users).items():
-        yield len(takers)
         chain, successor = chains[id], takers[0]
         if set(hands.chains[id].parts).isdisjoint(hands.chains[successor].parts):
             continue  # One of them uses the other arm from now on, and all is arranged anew.
@@ -209,7 +203,6 @@ def arrange(
                 # A behavior that has made its stroke hands over; for one that has not, a free other arm is better.
                 rivals = tuple([each for each in (successor, id) if each not in begun])
                 conflicts.append(Conflict(turn, hands.choose(rivals)))
-                yield 1 + len(chains) // 32  # `hands` has looked at all others
         if chain.type != "speech":
             handovers[id] = tuple([_handover(chain, chains[each], relations, times) for each in takers])
         if id in successors or id in beneath:  # Who begins beneath a look ends by itself, at once.

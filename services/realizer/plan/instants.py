@@ -13,7 +13,6 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Term
 from engage_hri.services.realizer.points import EPSILON, ORIGIN, Point
-from engage_hri.services.runtime.steps import PORTION, Steps, portions
 
 _OFFSET = re.compile(r"\s*[+-]\s*[0-9.]+(e[+-]?[0-9]+)?\s*$", re.IGNORECASE)
 """Offset behind the point that a reference names: `+0.5`."""
@@ -155,21 +154,15 @@ def _named(term: Term) -> str:
     return str(ORIGIN) if term.point == ORIGIN else _OFFSET.sub("", term.text)
 
 
-def instants(classes: Classes, points: Collection[Point]) -> Steps[list[Instant]]:
+def instants(classes: Classes, points: Collection[Point]) -> list[Instant]:
     """`points` (in a canonical order) grouped into instants: classes by their first point, each by offset."""
     members: dict[Point, list[tuple[Seconds, int, Point]]] = {}
-    number = 0
-    for portion in portions(points):
-        for point in portion:
-            classes.add(point)
-            root, offset = classes.find(point)
-            members.setdefault(root, []).append((offset, number, point))
-            number += 1
-        yield len(portion)
+    for number, point in enumerate(points):
+        classes.add(point)
+        root, offset = classes.find(point)
+        members.setdefault(root, []).append((offset, number, point))
     found: list[Instant] = []
     for class_id, group in enumerate(members.values()):
-        if not class_id % PORTION:
-            yield PORTION
         if len(group) == 1:
             alone = group[0][2]
             found.append(Instant((alone,), class_id, 0.0, classes.at(alone)))

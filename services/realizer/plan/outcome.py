@@ -14,7 +14,6 @@ from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.poses import NOTICEABLE
 from engage_hri.services.realizer.plan.promises import Broken, broken_by
 from engage_hri.services.realizer.points import Point, Segment
-from engage_hri.services.runtime.steps import in_one_go
 
 
 def as_told(plan: Plan, told: Sequence[Estimate]) -> Plan:
@@ -23,7 +22,7 @@ def as_told(plan: Plan, told: Sequence[Estimate]) -> Plan:
     Whoever performs it tries to be on time all the same.
     """
     times = _times(plan, {(each.behavior, phase.to): phase for each in told for phase in each.phases})
-    missed = [each for each in in_one_go(broken_by)(plan.relations, times) if not _is_foreign(each)]
+    missed = [each for each in broken_by(plan.relations, times) if not _is_foreign(each)]
     late = {(plan.at[each.late], plan.at[each.early]): each.seconds for each in missed}
     return replace(plan, late=late, broken=(*filter(_is_foreign, plan.broken), *missed))
 

@@ -34,7 +34,6 @@ from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Relations
 from engage_hri.services.realizer.plan.spare_time import distances, spare_times
 from engage_hri.services.realizer.points import EPSILON, SHIFTS
-from engage_hri.services.runtime.steps import Steps
 
 
 class Untouched(NamedTuple):
@@ -88,7 +87,7 @@ class PartOrder:
 
     def change(
         self, impossible: Iterable[Turn], turns: Iterable[Turn], chains: Mapping[str, Chain], begun: Container[str]
-    ) -> Steps[bool]:
+    ) -> bool:
         """Order the parts anew, since one behavior cannot wait for another; False if that gives no new order.
 
         impossible: waits for which there is no time. turns: all waits so far. begun: behaviors that have their parts
@@ -103,13 +102,13 @@ class PartOrder:
         rivals = {id for waiter, point in (*found, *turns) for id in (waiter, point.behavior)}
         self._rivals |= {id for id in rivals & chains.keys() if id not in begun and chains[id].type != "speech"}
         before = self._changed
-        self._changed = yield from _ordered([chains[id] for id in chains if id in self._rivals], self._untouched)
+        self._changed = _ordered([chains[id] for id in chains if id in self._rivals], self._untouched)
         return self._changed != before
 
 
-def _ordered(users: Sequence[Chain], untouched: Untouched) -> Steps[frozenset[Turn]]:
+def _ordered(users: Sequence[Chain], untouched: Untouched) -> frozenset[Turn]:
     """Each of these behaviors with the one before it that has the same part."""
-    room = yield from _room(users, untouched)
+    room = _room(users, untouched)
     by_leaving = sorted(users, key=untouched.leaving)
     parts = sorted({part for chain in users for part in chain.parts})
     # A shift takes nothing from a look, nor a look from a shift: see `handover.in_series`.
@@ -118,7 +117,7 @@ def _ordered(users: Sequence[Chain], untouched: Untouched) -> Steps[frozenset[Tu
         for part in parts
         for is_shift in (False, True)
     ]
-    yield from _decide(groups, room)
+    _decide(groups, room)
     turns = set[Turn]()
     for group in groups:
         order: list[Chain] = []
@@ -129,12 +128,11 @@ def _ordered(users: Sequence[Chain], untouched: Untouched) -> Steps[frozenset[Tu
                 order.insert(place, chain)
                 for earlier, later in pairwise(order[max(0, place - 1) : place + 2]):
                     room.take(earlier, later)
-        yield 4 * len(group)
         turns |= {(later.behavior.id, one.points[untouched.left(one)]) for one, later in pairwise(order)}
     return frozenset(turns)
 
 
-def _decide(groups: Iterable[Sequence[Chain]], room: "_Room") -> Steps[None]:
+def _decide(groups: Iterable[Sequence[Chain]], room: "_Room") -> None:
     """Let one wait for the other wherever only one can, until nothing new follows."""
     undecided = {
         frozenset((one.behavior.id, two.behavior.id)): (one, two)
@@ -144,7 +142,6 @@ def _decide(groups: Iterable[Sequence[Chain]], room: "_Room") -> Steps[None]:
     is_new = True
     while is_new:
         decided = [pair for pair, both in undecided.items() if room.decide(*both)]
-        yield len(undecided) // 2
         for pair in decided:
             del undecided[pair]
         is_new = bool(decided)
@@ -184,10 +181,9 @@ class _Room:
         return all(self.is_left(each, chain) for each in before) and all(self.is_left(chain, each) for each in after)
 
 
-def _room(users: Sequence[Chain], untouched: Untouched) -> Steps[_Room]:
+def _room(users: Sequence[Chain], untouched: Untouched) -> _Room:
     at, times = untouched.assembly.at, untouched.times
     spare = spare_times(untouched.ties, times)
-    yield len(times)
     clock = distances(0, spare)
     spare[0] = []  # From each start, the way through the start of the block is known then.
     ends = [at[chain.points[untouched.left(chain)]] for chain in users]
@@ -198,5 +194,4 @@ def _room(users: Sequence[Chain], untouched: Untouched) -> Steps[_Room]:
         apart.append(
             [times[end] - times[start] - min(found.get(end, inf), back + clock.get(end, inf)) for end in ends]
         )
-        yield len(found)
     return _Room(users, apart)

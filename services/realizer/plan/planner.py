@@ -5,8 +5,9 @@ each with a warning: behaviors that the body cannot do, and those that cannot be
 between equals; any other permutation of a block gives the same net.
 """
 
-from collections.abc import Collection, Container, Iterable, Mapping
+from collections.abc import Collection, Container, Generator, Iterable, Mapping
 from functools import partial
+from typing import TypeVar
 
 from msgspec.structs import replace
 
@@ -16,10 +17,10 @@ from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.services.realizer.plan import points_of_others, unsupported
-from engage_hri.services.realizer.plan.assembly import Assembler, Assembly, assembling
+from engage_hri.services.realizer.plan.assembly import Assembler, Assembly
 from engage_hri.services.realizer.plan.comparison import compared
 from engage_hri.services.realizer.plan.deadlocks import Loss, Losses, clashes, judge
-from engage_hri.services.realizer.plan.given_up import times_of
+from engage_hri.services.realizer.plan.given_up import Times
 from engage_hri.services.realizer.plan.handover import (
     Arrangement,
     Conflict,
@@ -45,7 +46,7 @@ from engage_hri.services.realizer.plan.relations import (
     Term,
     as_dropped,
     at_line,
-    relation_steps,
+    relations_of,
 )
 from engage_hri.services.realizer.plan.remaining import remaining, untied
 from engage_hri.services.realizer.plan.schedule import Solution, critical_path
@@ -54,10 +55,13 @@ from engage_hri.services.realizer.plan.speaking_order import Misordered, Speakin
 from engage_hri.services.realizer.plan.turns import by_ends, turns_in
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import Point, frozen
-from engage_hri.services.runtime.steps import PORTION, Steps, in_one_go, portions
+
+T = TypeVar("T")
+Tries = Generator[None, None, T]
+"""Work that makes nets until one of them will do, and pauses before each but the first."""
 
 
-def plan_steps(
+def plan_block(
     block: Block,
     estimates: Iterable[Estimate] = (),
     *,
@@ -66,20 +70,40 @@ def plan_steps(
     barred: Container[tuple[str, Hand]] = (),
     turns: frozenset[Turn] = frozenset(),
     manner: Manner = AT_EASE,
-) -> Steps[Plan]:
-    """Plan `block` in steps; durations that no estimate gives are nominal. Raises BlockRefused, with place and line.
+) -> Plan:
+    """Plan `block`; durations that no estimate gives are nominal. Raises BlockRefused, with place and line.
 
     dropped: behaviors to leave out as if never written. known: other live blocks. barred: hands with which a behavior
     cannot be done. turns: those to begin with. manner: see there.
     """
+    tries = plan_tries(block, estimates, dropped=dropped, known=known, barred=barred, turns=turns, manner=manner)
+    while True:
+        try:
+            next(tries)
+        except StopIteration as end:
+            plan: Plan = end.value
+            return plan
+
+
+def plan_tries(
+    block: Block,
+    estimates: Iterable[Estimate] = (),
+    *,
+    dropped: Iterable[str] = (),
+    known: Known = NOTHING,
+    barred: Container[tuple[str, Hand]] = (),
+    turns: frozenset[Turn] = frozenset(),
+    manner: Manner = AT_EASE,
+) -> Tries[Plan]:
+    """Plan as `plan_block` does, with a pause before each net but the first. What is given must not change meanwhile.
+
+    A block that a person wrote is settled with the first net. Others need as many as they have behaviors, and who
+    performs something else meanwhile gets its turn at the pauses.
+    """
     planner = _Planner(block, {each.behavior: each for each in estimates}, dropped, barred, known, manner)
     planner.parts = PartOrder(turns)
-    yield from planner.read()
+    planner.read()
     return (yield from planner.plan())
-
-
-plan_block = in_one_go(plan_steps)
-"""Plan as `plan_steps` does, in one go."""
 
 
 class _Planner:
@@ -117,14 +141,12 @@ class _Planner:
         self.hands: dict[str, Hand] = {}
         self.chains: dict[str, Chain] = {}
 
-    def read(self) -> Steps[None]:
-        self.relations = yield from relation_steps(self.block, self.known.blocks)
+    def read(self) -> None:
+        self.relations = relations_of(self.block, self.known.blocks)
         self.problems = [*dict.fromkeys((*self.relations.problems, *self.manner.lost))]
-        for portion in portions(self.block.behaviors):
-            for behavior in portion:
-                if behavior.id not in self.dropped:
-                    self._read(behavior)
-            yield 4 * len(portion)
+        for behavior in self.block.behaviors:
+            if behavior.id not in self.dropped:
+                self._read(behavior)
         self._let_fall()
         if begun := sorted(
             self.known.begun & self.chains.keys(), key=lambda id: self.known.natural_end(self.chains[id])
@@ -172,7 +194,7 @@ class _Planner:
             if needed in self.depending:
                 self.depending[id] = fallen, self.depending[needed][1], self.problems[-1]
 
-    def plan(self) -> Steps[Plan]:
+    def plan(self) -> Tries[Plan]:
         """The plan; behaviors that cannot be on time are dropped until the rest can be.
 
         It comes to an end: each time it is tried anew, a time of a speech is gone for good, a turn that nobody can
@@ -182,43 +204,43 @@ class _Planner:
             self.turns = self.parts.turns - self.overlaps
             said = self.relations
             left = untied(said, self.untied) if self.untied else said
-            present, classes = yield from remaining(left, self.chains, self.dropped, self.block.id)
+            present, classes = remaining(left, self.chains, self.dropped, self.block.id)
             try:
                 plan = yield from self._plan(present, classes)
                 if self.untied:
-                    present, _ = yield from remaining(said, self.chains, self.dropped, self.block.id)
-                return (yield from compared(plan, present, self.known))
+                    present, _ = remaining(said, self.chains, self.dropped, self.block.id)
+                return compared(plan, present, self.known)
             except Misordered:
-                continue
+                pass
             except Losses as found:
                 waits = [loss.turn for loss in found.losses if loss.turn in self.turns]
-                if (yield from self.parts.change(waits, self.turns, self.chains, self.known.begun)):
-                    continue
-                times = yield from times_of(self.speeches, self.relations)
-                gone, losses, given_up = {*self.dropped}, list[Loss](), set[Point]()
-                for number, loss in enumerate(found.losses):
-                    if not number % PORTION:
-                        yield 8 * PORTION
-                    turn = loss.turn
-                    if turn and turn in self.turns and may_speak_at_once(turn[1].behavior, self.chains, present):
-                        self.overlaps.add(turn)
-                    elif time := times.give_up(loss.points, loss.among, gone):
-                        given_up.add(time[0])
-                        self._keep_words(*time, loss.reason)
-                    else:
-                        gone.add(loss.behavior)
-                        losses.append(loss)
-                self.relations = times.left
-                self._take_back(given_up)
-                for part in portions(losses):
-                    for loss in part:
-                        if given_up.isdisjoint(loss.among):
-                            self._lose(loss)
-                    yield len(part)
-                self._let_fall()
-                self.order.begin_anew(self.chains)
-                self.parts.begin_anew()
-                self.doubted.clear()  # What they were too late for may be gone.
+                if not self.parts.change(waits, self.turns, self.chains, self.known.begun):
+                    self._give_up(found.losses, present)
+            yield
+
+    def _give_up(self, found: Iterable[Loss], present: Relations) -> None:
+        """Give up what cannot be on time: a wait, a time of a speech, or else the behavior."""
+        times = Times(self.relations, self.speeches)
+        gone, losses, given_up = {*self.dropped}, list[Loss](), set[Point]()
+        for loss in found:
+            turn = loss.turn
+            if turn and turn in self.turns and may_speak_at_once(turn[1].behavior, self.chains, present):
+                self.overlaps.add(turn)
+            elif time := times.give_up(loss.points, loss.among, gone):
+                given_up.add(time[0])
+                self._keep_words(*time, loss.reason)
+            else:
+                gone.add(loss.behavior)
+                losses.append(loss)
+        self.relations = times.left
+        self._take_back(given_up)
+        for loss in losses:
+            if given_up.isdisjoint(loss.among):
+                self._lose(loss)
+        self._let_fall()
+        self.order.begin_anew(self.chains)
+        self.parts.begin_anew()
+        self.doubted.clear()  # What they were too late for may be gone.
 
     def _lose(self, loss: Loss) -> None:
         id = loss.behavior
@@ -243,7 +265,7 @@ class _Planner:
         self.problems.append(Problem("IMPOSSIBLE_TO_SCHEDULE", at_line(self.lines[id], reason), id))
         self.given_up.setdefault(id, {})[said] = self.problems[-1]
 
-    def _plan(self, present: Relations, classes: Classes) -> Steps[Plan]:
+    def _plan(self, present: Relations, classes: Classes) -> Tries[Plan]:
         """The plan of the behaviors that are left. Raises Losses: those that cannot be on time.
 
         A conflict adds a turn, or settles a hand. Between two conflicts handovers only become more, or keep more. If
@@ -255,41 +277,36 @@ class _Planner:
         self.turns = frozen(turn for turn in self.turns if {turn[0], turn[1].behavior} <= self.chains.keys())
         arranged_anew = partial(Arrangement, natural, self.known.begun, early=self.early, stops=self.known.stops)
         arrangement = arranged_anew(turns=self.turns, spoken=self.order.current)
-        assembler = yield from assembling(self.chains, present, classes, waited_for)
+        assembler = Assembler(self.chains, present, classes, waited_for)
         given = {name: holder.chain for name, holder in self.known.holders.items()}
         tried: list[Arrangement] = []
         """Arrangements since the last conflict."""
         while True:
             assembler.waive(self.customs)
             if (named := naming_others(present, arrangement)) != assembler.relations:
-                assembler = yield from assembling(self.chains, named, classes, waited_for)
+                assembler = Assembler(self.chains, named, classes, waited_for)
             assembler, assembly, solution = yield from self._solved(assembler, arrangement, classes)
             times = {point: solution.times[transition] for point, transition in assembly.at.items()}
             self.parts.see(assembly, solution.times, present)
-            yield len(times) // 4
             everywhere = self.known.in_truth(self.chains.values(), times, solution.times[-1])
             rounds = assembly.rounds(solution.times)
             kept = present.held.union(*(holder.kept for holder in self.known.holders.values()))
             hands = Hands({**self.chains, **given}, everywhere, kept, self.barred)
-            yield len(times) // 4
-            arranged, conflicts = yield from arrange(
+            arranged, conflicts = arrange(
                 self.chains, present, arrangement, everywhere, rounds, hands, self.known.begun
             )
             undated = points_of_others.without_date(assembly, self.known) if given else ()
             waits = points_of_others.waits(assembly, self.known)
-            sharing = share(self.chains, present, self.known, arranged, everywhere, hands, undated, waits)
-            arranged, others = yield from sharing
+            arranged, others = share(self.chains, present, self.known, arranged, everywhere, hands, undated, waits)
             conflicts = [
                 each for each in (*conflicts, *others) if each.is_open(self.known.begun, self.overlaps | self.turns)
             ]
             turns = [each.turn for each in conflicts if each.turn and not (each.hand or waits_elsewhere(each.turn))]
-            rivals = clashes(turns, self.chains, self.relations.required, classes, everywhere, self.spelling)
-            if (losses := (yield from rivals)) and not self.manner.may_be_late:
+            losses = clashes(turns, self.chains, self.relations.required, classes, everywhere, self.spelling)
+            if losses and not self.manner.may_be_late:
                 raise Losses(losses)
-            for part in portions(conflicts):
-                for conflict in part:
-                    self._resolve(conflict)
-                yield 2 * len(part)
+            for conflict in conflicts:
+                self._resolve(conflict)
             tried.append(arrangement)
             if conflicts:
                 arrangement, tried = arranged_anew(turns=self.turns, spoken=arrangement.spoken), []
@@ -301,6 +318,7 @@ class _Planner:
                 arrangement, tried = arranged_anew(turns=self.turns, spoken=arrangement.spoken), []
             else:
                 break
+            yield
         return Plan(
             block=with_hands(self.block, self.hands),
             behaviors=tuple([chain.behavior for chain in self.chains.values()]),
@@ -337,35 +355,35 @@ class _Planner:
 
     def _solved(
         self, assembler: Assembler, arrangement: Arrangement, classes: Classes
-    ) -> Steps[tuple[Assembler, Assembly, Solution]]:
+    ) -> Tries[tuple[Assembler, Assembly, Solution]]:
         """The net and its schedule; points in a circle without delay become one instant.
 
         Raises Losses, or BlockRefused: a deadlock.
         """
         while True:
-            assembly = yield from assembler.assemble(arrangement)
+            assembly = assembler.assemble(arrangement)
             net = standing(assembly.net, assembly.at, self.chains, self.manner.stands)
-            if assembly.is_ordered or not (circles := (yield from assembler.circles())):
+            if assembly.is_ordered or not (circles := assembler.circles()):
                 break
             for points in circles:
                 terms = tuple([Term(point, 0.0, str(point)) for point in points])
                 classes.tie(Equal(terms), self.block.id)
-            assembler = yield from assembling(self.chains, assembler.relations, classes, assembler.waited_for)
+            assembler = Assembler(self.chains, assembler.relations, classes, assembler.waited_for)
         try:
             times = points_of_others.foreseen(assembly, self.known, self.doubted)
             behind = tuple(points_of_others.awaited(assembly, self.known, self.waived))
             is_custom, may_be_late = (lambda ties: bool(assembly.waits(ties))), self.manner.may_be_late
-            solution = yield from predict(net, is_custom, times, behind, may_be_late)
+            solution = predict(net, is_custom, times, behind, may_be_late)
             if may_be_late:
                 net, self.late = eased(net, solution.times)
             assembly = replace(assembly, net=net)
-            if (yield from self.order.pass_alone(assembly.net, assembly.at, solution.times)):
+            if self.order.pass_alone(assembly.net, assembly.at, solution.times):
                 raise Misordered
             return assembler, assembly, solution
         except Impossible as impossible:
             turns = self.turns | arrangement.waits
             waits = list(turns_in(by_ends(turns, assembly.at), *impossible.circles))
-            if (yield from self.parts.change(waits, self.turns, self.chains, self.known.begun)):
+            if self.parts.change(waits, self.turns, self.chains, self.known.begun):
                 raise Misordered from None
             if self.order.refute(impossible.circles, assembly.net):
                 self.parts.begin_anew()
@@ -393,13 +411,11 @@ class _Planner:
                 self.customs |= idle
                 assembler.waive(self.customs)
             else:
-                yield 2 * len(self.chains)  # All that was asked of these circles.
                 present, turns = assembler.relations, turns | self.order.turns
-                raise (
-                    yield from judge(
-                        impossible, assembly, self.chains, present, classes, self.block.id, turns, self.spelling
-                    )
+                raise judge(
+                    impossible, assembly, self.chains, present, classes, self.block.id, turns, self.spelling
                 ) from None
+            yield
             return (yield from self._solved(assembler, arrangement, classes))
 
     def _resolve(self, conflict: Conflict) -> None:

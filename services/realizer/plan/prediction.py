@@ -7,7 +7,6 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
 from engage_hri.services.realizer.plan.schedule import Lag, PositiveCycle, Solution, solve
 from engage_hri.services.realizer.points import EPSILON, Point
-from engage_hri.services.runtime.steps import PORTION, Steps
 
 
 class Foresight(Place, frozen=True):
@@ -44,7 +43,7 @@ def predict(
     known: Mapping[int, Seconds] = {},
     awaited: Iterable[Awaited] = (),
     may_be_late: bool = False,
-) -> Steps[Solution]:
+) -> Solution:
     """The earliest schedule; `reason` of a cause is the number of the place or, after them, of the bound.
 
     known: when transitions come that depend on more than this net, at the earliest; negative: before the block.
@@ -62,17 +61,14 @@ def predict(
             # What came before the block does not wait for its start.
             is_before = tie.target in past and _is_beginning(tie)
             lags.append(Lag(tie.source, tie.target, past[tie.target] if is_before else tie.lag, number))
-        if not number % PORTION:
-            yield PORTION // 4
     index: dict[int, int] = {}
     while True:
         try:
-            return (yield from solve(len(net.transitions), lags, past))
+            return solve(len(net.transitions), lags, past)
         except PositiveCycle as found:
             index = index or {lag.reason: number for number, lag in enumerate(lags)}
             hopeless = []
             for cycle in found.cycles:
-                yield 3 * len(cycle)
                 circle = tuple([(ties[lag.reason], lag.seconds) for lag in cycle])
                 room = [seconds - least(tie) for tie, seconds in circle]
                 excess = sum(lag.seconds for lag in cycle)

@@ -9,7 +9,6 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.known import is_foreign
 from engage_hri.services.realizer.plan.relations import Equal, Order, Relations, Term, at_line
 from engage_hri.services.realizer.points import EPSILON, ORIGIN, Point
-from engage_hri.services.runtime.steps import Steps, portions
 
 
 class Broken(Struct, frozen=True):
@@ -96,19 +95,12 @@ class _Link(NamedTuple):
 class Promises:
     """Everything that a block says of its points, to be held against when they come, whoever comes wrong."""
 
-    def __init__(self) -> None:
+    def __init__(self, relations: Relations) -> None:
         self._of: dict[Point, _Link] = {}
-
-    def read(self, relations: Relations) -> Steps[None]:
-        """Take in what these relations say."""
-        for equals in portions(relations.equals):
-            for equal in equals:
-                self._take(_Same(equal), equal.terms)
-            yield 2 * len(equals)
-        for orders in portions(relations.orders):
-            for order in orders:
-                self._take(_Ordered(order), (order.earlier, order.later))
-            yield 2 * len(orders)
+        for equal in relations.equals:
+            self._take(_Same(equal), equal.terms)
+        for order in relations.orders:
+            self._take(_Ordered(order), (order.earlier, order.later))
 
     def _take(self, said: "_Same | _Ordered", terms: tuple[Term, ...]) -> None:
         for term in terms:
@@ -130,20 +122,11 @@ class Promises:
         return [each for each in found if each.early != each.late]
 
 
-def promises_of(relations: Relations) -> Steps[Promises]:
-    promises = Promises()
-    yield from promises.read(relations)
-    return promises
-
-
-def broken_by(relations: Relations, times: Mapping[Point, Seconds]) -> Steps[list[Broken]]:
+def broken_by(relations: Relations, times: Mapping[Point, Seconds]) -> list[Broken]:
     """Constraints that are broken if their points come at these times."""
-    promises = yield from promises_of(relations)
+    promises = Promises(relations)
     found: list[Broken] = []
     coming = [point for point in promises.points if point in times]
-    yield len(coming) // 4
-    for points in portions(sorted(coming, key=times.__getitem__)):
-        for point in points:
-            found += [each for each in promises.come(point, times[point]) if each.seconds > EPSILON]
-        yield 2 * len(points)
+    for point in sorted(coming, key=times.__getitem__):
+        found += [each for each in promises.come(point, times[point]) if each.seconds > EPSILON]
     return found

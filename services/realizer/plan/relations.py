@@ -31,7 +31,6 @@ from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.past import LASTING
 from engage_hri.services.realizer.points import ORIGIN, Point
-from engage_hri.services.runtime.steps import PORTION, Steps, finished, portions
 
 
 class BlockRefused(InputRefused):
@@ -257,8 +256,7 @@ class _Reader:
     def refusal(self, reason: str, where: str, line: int, advice: str = "") -> BlockRefused:
         return BlockRefused(Fault(reason=reason, where=f"{self.block.id}: {where}", line=line, advice=advice))
 
-    def read_constraints(self) -> Steps[None]:
-        done = 0
+    def read_constraints(self) -> None:
         for number, constraint in enumerate(self.block.constraints, 1):
             where = constraint.id or f"constraint {number}"
             for operator in constraint.operators:
@@ -268,10 +266,6 @@ class _Reader:
                 self._relate(operator, terms)
                 if constraint.required:
                     self.required |= {term.point.behavior for term in terms.values()} & self.behaviors.keys()
-                if (done := done + 4 * len(texts)) >= PORTION:
-                    yield done
-                    done = 0
-        yield done
 
     def _terms(self, texts: tuple[str, ...], where: str, line: int, *, required: bool) -> dict[str, Term]:
         terms: dict[str, Term] = {}
@@ -302,11 +296,9 @@ class _Reader:
                 ends = (ref, sync) if isinstance(operator, After) else (sync, ref)
                 self.orders.append(Order(*ends, (ref if sync.point == ORIGIN else sync).point.behavior))
 
-    def read_timing(self) -> Steps[None]:
-        for portion in portions(self.block.behaviors):
-            for behavior in portion:
-                self._read_timing_of(behavior)
-            yield 4 * len(portion)
+    def read_timing(self) -> None:
+        for behavior in self.block.behaviors:
+            self._read_timing_of(behavior)
 
     def _read_timing_of(self, behavior: BlockBehavior) -> None:
         equals: list[Equal] = []
@@ -362,14 +354,14 @@ class _Reader:
         return replace(found, problems=found.problems + endless + empty)
 
 
-def relation_steps(block: Block, elsewhere: Elsewhere | None = None) -> Steps[Relations]:
+def relations_of(block: Block, elsewhere: Elsewhere | None = None) -> Relations:
     """Read everything that `block` says about its points. Raises InputRefused: a malformed or dangling reference.
 
     elsewhere: other live blocks, by id. Their points become `Point("block:behavior", sync)`.
     """
     reader = _Reader(block, elsewhere or {})
-    yield from reader.read_constraints()
-    yield from reader.read_timing()
+    reader.read_constraints()
+    reader.read_timing()
     return reader.result()
 
 
@@ -383,7 +375,7 @@ def extent(block: Block) -> int:
 
 def needing(block: Block, elsewhere: Elsewhere, points: Collection[Point]) -> list[tuple[str, Point]]:
     """Behaviors that are required, or in a required constraint, and tied to one of these points of other blocks."""
-    relations = finished(relation_steps(block, elsewhere))
+    relations = relations_of(block, elsewhere)
     ties = [equal.terms for equal in relations.equals] + [(each.earlier, each.later) for each in relations.orders]
     return [
         (one.point.behavior, other.point)

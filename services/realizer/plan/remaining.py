@@ -12,12 +12,11 @@ from engage_hri.services.realizer.plan.known import is_foreign
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Equal, Order, Relations, Term
 from engage_hri.services.realizer.points import ORIGIN, Point, frozen
-from engage_hri.services.runtime.steps import Steps, portions
 
 
 def remaining(
     relations: Relations, chains: Mapping[str, Chain], dropped: Container[str], block: str
-) -> Steps[tuple[Relations, Classes]]:
+) -> tuple[Relations, Classes]:
     """Relations of the behaviors that are not dropped, and the classes of their points.
 
     Raises BlockRefused: they contradict each other. block: its id.
@@ -32,10 +31,8 @@ def remaining(
         for equal in relations.equals
         if (kept := tuple(filter(is_left, equal.terms))) and (len(kept) > 1 or len(equal.terms) == 1)
     ]
-    yield len(equals)
-    classes = yield from _classes(chains, equals, block)
+    classes = _classes(chains, equals, block)
     equals += [equal for equal in _left_over(relations, chains, dropped) if classes.tie_if_possible(equal)]
-    yield len(equals)
     orders = [each for each in relations.orders if is_left(each.earlier) and is_left(each.later)]
     present = Relations(
         tuple(equals),
@@ -115,14 +112,11 @@ def _timed(chains: Mapping[str, Chain], term: Term) -> Term:
     return replace(term, offset=term.offset + share * strokes, stroke=0)
 
 
-def _classes(chains: Mapping[str, Chain], equals: Collection[Equal], block: str) -> Steps[Classes]:
+def _classes(chains: Mapping[str, Chain], equals: Collection[Equal], block: str) -> Classes:
     classes = Classes()
-    for portion in portions(chains.values()):
-        for each in portion:
-            for syncs in TYPES[each.type].one_instant:
-                classes.tie(Equal(tuple([Term(Point(each.behavior.id, sync), 0.0, sync) for sync in syncs])), "")
-        yield 2 * len(portion)
+    for each in chains.values():
+        for syncs in TYPES[each.type].one_instant:
+            classes.tie(Equal(tuple([Term(Point(each.behavior.id, sync), 0.0, sync) for sync in syncs])), "")
     for equal in equals:
         classes.tie(equal, block)
-        yield 2 * len(equal.terms)
     return classes

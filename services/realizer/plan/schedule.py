@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.points import EPSILON
-from engage_hri.services.runtime.steps import Steps
 
 LAGS_AN_ELEMENT = 32
 """Number of lags that take as long as one element of a block: see `steps`."""
@@ -49,7 +48,7 @@ class Solution(NamedTuple):
     causes: dict[int, Lag]
 
 
-def solve(size: int, lags: Sequence[Lag], past: Mapping[int, Seconds] = {}) -> Steps[Solution]:
+def solve(size: int, lags: Sequence[Lag], past: Mapping[int, Seconds] = {}) -> Solution:
     """The least instants, none before 0 or what `past` says, that satisfy `lags`. Raises PositiveCycle.
 
     Sweeps go to and fro over the lags. Where these are in an order in which they can be met, forward lags need one
@@ -65,7 +64,6 @@ def solve(size: int, lags: Sequence[Lag], past: Mapping[int, Seconds] = {}) -> S
     sweeps = (inner, inner[::-1])
     for number in range(2 * size + 4):
         moved = None
-        yield 1 + len(lags) // LAGS_AN_ELEMENT
         for lag in sweeps[number % 2]:
             source, target, seconds, _ = lag
             at = times[source] + seconds

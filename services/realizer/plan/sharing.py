@@ -26,7 +26,6 @@ from engage_hri.services.realizer.plan.known import BLOCK_END, Holder, Known, is
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Equal, Relations, Term
 from engage_hri.services.realizer.points import EPSILON, Point
-from engage_hri.services.runtime.steps import Steps
 
 
 class Waits(NamedTuple):
@@ -52,7 +51,7 @@ def share(
     hands: Hands,
     undated: Container[str] = (),
     waits: Waits = NOBODY,
-) -> Steps[tuple[Arrangement, list[Conflict]]]:
+) -> tuple[Arrangement, list[Conflict]]:
     """The arrangement with the handovers from and to behaviors of other live blocks, and the conflicts with them.
 
     times: of the points of this block, in the schedule that `arranged` is for, and of others. hands: as of `arrange`.
@@ -63,7 +62,6 @@ def share(
         return arranged, []
     shared = _Sharing(chains, relations, known, arranged, times, hands, waits)
     for id in chains:
-        yield 2 + len(known.holders) // 8
         shared.give(id)
         for name in shared.rivals(id) if id not in undated else ():
             shared.settle(id, name)

@@ -17,7 +17,6 @@ from engage_hri.services.realizer.plan.prediction import Circle
 from engage_hri.services.realizer.plan.relations import Relations
 from engage_hri.services.realizer.plan.spare_time import distances, spare_times
 from engage_hri.services.realizer.points import EPSILON, Point
-from engage_hri.services.runtime.steps import Steps
 
 WORK = 400
 """Orders that are tried, times behaviors of the block."""
@@ -65,14 +64,14 @@ class SpeakingOrder:
         else:
             self._stage, self.current, self._nearest = "last", nearest, nearest
 
-    def pass_alone(self, net: PetriNet, at: Mapping[Point, int], times: Sequence[Seconds]) -> Steps[bool]:
+    def pass_alone(self, net: PetriNet, at: Mapping[Point, int], times: Sequence[Seconds]) -> bool:
         """Take note that the block can be scheduled. True if that was without an order: one is to be tried now.
 
         at: the transition of each point. times: of each transition.
         """
         if self._stage != "alone":
             return False
-        before = yield from _before(self._first, net, at, times)
+        before = _before(self._first, net, at, times)
         self._stage, self.current = "search", _sorted(self._first, before)
         self._nearest = self.current
         if self.current not in self._seen:
@@ -153,22 +152,19 @@ def _sorted(speeches: Sequence[str], before: Mapping[str, Sequence[str]]) -> tup
 
 def _before(
     speeches: Sequence[str], net: PetriNet, at: Mapping[Point, int], times: Sequence[Seconds]
-) -> Steps[dict[str, list[str]]]:
+) -> dict[str, list[str]]:
     """For each speech, those that have to come before it, in order, with every phase as short as can be.
 
     times: of a schedule. Two that have to come before each other are in no order.
     """
     ties: tuple[Place | Bound, ...] = (*net.places, *net.bounds)
     spare = spare_times(ties, times)
-    yield len(ties) // 4
     starts, ends = ({id: at[Point(id, sync)] for id in speeches} for sync in ("start", "end"))
     clock = distances(0, spare)
-    yield len(clock)
     spare[0] = []  # From each start, the way through the start of the block is known then.
     before: dict[str, dict[str, None]] = {id: {} for id in speeches}
     for id, start in starts.items():
         found = distances(start, spare)
-        yield len(found) + len(speeches) // 4
         for other, end in ends.items():
             distance = min(found.get(end, inf), found.get(0, inf) + clock.get(end, inf))
             if other != id and distance < times[end] - times[start] - EPSILON:

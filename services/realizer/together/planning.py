@@ -19,15 +19,14 @@ from engage_hri.services.realizer.plan.handover import hands_refused
 from engage_hri.services.realizer.plan.known import Known, is_foreign, is_named_in
 from engage_hri.services.realizer.plan.past import Past
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.planner import plan_steps
+from engage_hri.services.realizer.plan.planner import Tries, plan_tries
 from engage_hri.services.realizer.plan.poses import planned_times, poses_before
-from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relation_steps
+from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relations_of
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.realizer.together.body_questions import is_crowd, meanwhile, parts_moved, question_about
 from engage_hri.services.realizer.together.knowledge import Asker, knowledge, may_share, parts_of
 from engage_hri.services.realizer.together.live import Live
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks
-from engage_hri.services.runtime.unhurried import unhurried
 
 ESTIMATE: Seconds = 2.0
 """Time that the body may take to answer what it expects of a block; one that is planning itself needs it. Ours."""
@@ -58,7 +57,7 @@ class Planning:
                 block, f"{held} behaviors, marks and sync references; at most {MOST} are planned in time"
             )
         # Bad references are refused before the body is asked.
-        relations = await unhurried(relation_steps(block, live.elsewhere))
+        relations = relations_of(block, live.elsewhere)
         elsewhere = live.elsewhere = {name: live.elsewhere[name] for name in sorted(relations.blocks)}
         named = frozenset(point for point in relations.named if is_foreign(point.behavior))
         block = validated(block)
@@ -99,10 +98,10 @@ class Planning:
             if is_to_wait:
                 known = replace(known, holders={})
             try:
-                steps = plan_steps(
+                tries = plan_tries(
                     chosen, rounds.estimates, known=known, barred=barred, turns=rounds.turns, manner=rounds.manner
                 )
-                plan = await unhurried(steps)
+                plan = await _in_turns(tries)
             except BlockRefused:
                 if rounds.turns:
                     rounds.let_go()
@@ -180,6 +179,17 @@ async def planned_alone(bus: Bus, block: Block) -> Plan:
     """Plan a block with the body on this bus, beside no other block. Raises BlockRefused."""
     live = Live(PerformBlock(id="plan", block=block), (), Past(bus.now))
     return await Planning(bus, LiveBlocks(bus.now), list).plan(live)
+
+
+async def _in_turns(tries: Tries[Plan]) -> Plan:
+    """The plan, with a turn for whatever else is due before each net but the first."""
+    while True:
+        try:
+            next(tries)
+        except StopIteration as end:
+            plan: Plan = end.value
+            return plan
+        await asyncio.sleep(0)
 
 
 def _too_large(block: Block, reason: str) -> BlockRefused:

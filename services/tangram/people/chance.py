@@ -1,7 +1,7 @@
 """Source of chance for pure code, and delays drawn from it, with the statistics of Table 2.1 of the thesis."""
 
-from collections.abc import MutableSequence, Sequence
-from typing import Any, Protocol, TypeVar
+from collections.abc import Sequence
+from typing import Protocol, TypeVar
 
 from msgspec import Struct
 
@@ -21,7 +21,6 @@ class Chance(Protocol):
     def betavariate(self, alpha: float, beta: float) -> float: ...
     def expovariate(self, lambd: float) -> float: ...
     def choice(self, seq: Sequence[T]) -> T: ...
-    def shuffle(self, x: MutableSequence[Any]) -> None: ...
 
 
 class Delays(Struct, frozen=True):

@@ -110,7 +110,7 @@ async def test_a_film_as_mp4_is_as_long_as_what_it_shows(body: MujocoBody, camer
     ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="needs the package imageio-ffmpeg, to read it again")
     film = Film(body.bench.model, rate=4.0)
     for number in (0, 1, 2, 6):
-        film.take(replace(body.frame(), at=number / 4))
+        film.frames.append(replace(body.frame(), at=number / 4))
     film.write(file := tmp_path / "film.mp4", size=(160, 120))
     frames, seconds = ffmpeg.count_frames_and_secs(str(file))
 
@@ -140,7 +140,7 @@ async def test_a_film_that_ffmpeg_cannot_write_is_told(body: MujocoBody, camera:
     camera.close()
     pytest.importorskip("imageio_ffmpeg", reason="needs the package imageio-ffmpeg")
     film = Film(body.bench.model)
-    film.take(body.frame())
+    film.frames.append(body.frame())
     with pytest.raises(RunFailed, match="ffmpeg could not write"):
         film.write(tmp_path / "nowhere" / "film.mp4", size=(160, 120))
 

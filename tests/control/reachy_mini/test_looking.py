@@ -14,11 +14,11 @@ from engage_hri.services.control.contract.body import BodyFailed, Reached
 from engage_hri.services.control.motion.path import JointMotion, resting
 from engage_hri.services.control.reachy_mini import joints
 from engage_hri.services.control.reachy_mini.body import ReachyMini
-from engage_hri.services.control.reachy_mini.estimates import FRAME, _settling
-from engage_hri.services.control.reachy_mini.moving import SHORTEST, Moves
+from engage_hri.services.control.reachy_mini.moves import FRAME, NEAR, SHORTEST, Moves, settling
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
-from engage_hri.services.control.reachy_mini.tracks import NEAR
-from engage_hri.services.control.testing import ON_AXIS, WORLD, Stage, aside, performed
+from engage_hri.services.control.testing import WORLD, Stage, performed
+from engage_hri.services.control.testing.laws import aside
+from engage_hri.services.control.testing.suite import ON_AXIS
 from tests.control.reachy_mini.fake import FakeDaemon
 from tests.control.reachy_mini.limits import too_much
 
@@ -275,9 +275,20 @@ async def test_a_gaze_beside_its_target_says_that_it_rests_on_nothing(body: Reac
     assert not body.estimate(replace(look, target="nobody"), None, WORLD).feasible
 
 
+class Still:
+    """A clock that does not move."""
+
+    def time(self) -> float:
+        return 0.0
+
+
+def at_rest() -> Moves:
+    return Moves(Still(), ReachyMiniSettings())
+
+
 @pytest.mark.parametrize("track", joints.TRACKS)
 def test_what_rests_where_it_is_to_go_takes_no_time_and_what_still_moves_there_some(track: str) -> None:
-    moves, here = Moves(ReachyMiniSettings()), resting(joints.HOME[track])
+    moves, here = at_rest(), resting(joints.HOME[track])
 
     assert moves.way(track, here, joints.HOME[track]).length == 0.0
     moving = JointMotion(here.q, here.v + 0.02, here.a)
@@ -288,14 +299,14 @@ def test_what_rests_where_it_is_to_go_takes_no_time_and_what_still_moves_there_s
 @pytest.mark.parametrize("yaw", [0.1, 0.4, 0.9])
 def test_joints_that_follow_late_are_expected_at_their_goal_not_before_and_soon_after(yaw: float, lag: float) -> None:
     home = joints.HOME["head"]
-    path = Moves(ReachyMiniSettings()).way("head", resting(home), (home[0] + yaw, *home[1:]))
+    path = at_rest().way("head", resting(home), (home[0] + yaw, *home[1:]))
     limit = NEAR[joints.TRACKS["head"][0].joint]
     places = [path.at(path.length - lag * step / 16_000).q[0] for step in range(16_001)]
     near = max(
         step for step, place in enumerate(places) if abs(place - home[0] - yaw) <= limit
     )  # it only comes nearer
 
-    told = _settling("head", path, path.length, lag)
+    told = settling("head", path, path.length, lag)
 
     assert 0 < near < 16_000
     assert told == pytest.approx(lag * (1.0 - near // 1000 / 16) + FRAME / 2)  # in sixteenths, rounded up

@@ -13,7 +13,9 @@ from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.services.control.contract.body import BehaviorRefused, BodyFailed
 from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
-from engage_hri.services.control.testing import ON_AXIS, WORLD, Stage, aside, performed
+from engage_hri.services.control.testing import WORLD, Stage, performed
+from engage_hri.services.control.testing.laws import aside
+from engage_hri.services.control.testing.suite import ON_AXIS
 from tests.control.reachy_mini.fake import HOME, FakeDaemon
 from tests.control.reachy_mini.limits import too_much
 

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 from engage_hri.schemas.behaviors import EventKind
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.tangram.people.human_session import BETWEEN, EXPLAINER, LISTENER, OBJECTS, TURN, Planned
-from engage_hri.services.tangram.people.table_2_1 import EVENTS, LONGEST_GAP, MTBCE, TABLE
+from tests.tangram.people.human_session import BETWEEN, EXPLAINER, LISTENER, OBJECTS, TURN, Planned
+from tests.tangram.people.table_2_1 import EVENTS, LONGEST_GAP, MTBCE, TABLE
 
 DELAYS: Mapping[tuple[EventKind, bool], tuple[Seconds, ...]] = {
     ("directed_gaze", True): (*[0.0] * 4, *[0.1] * 6, 0.65, 0.65, 2.0),

@@ -11,8 +11,8 @@ from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.session import Session
 from engage_hri.services.recognition.statistics.tally import EventTally
-from engage_hri.services.tangram.people.human_session import Pace, Planned, draw, observations
-from engage_hri.services.tangram.people.table_2_1 import EVENTS, LONGEST_GAP, MTBCE, TABLE
+from tests.tangram.people.human_session import Pace, Planned, draw, observations
+from tests.tangram.people.table_2_1 import EVENTS, LONGEST_GAP, MTBCE, TABLE
 from tests.tangram.people.table_session import exactly
 
 SEEDS = 200

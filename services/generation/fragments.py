@@ -1,13 +1,15 @@
-"""Runs fragments: takes them, sends their blocks in order, follows these, and answers with the outcomes.
+"""Fragments that wait or are performed: taken, their blocks sent in order and followed, answered with outcomes. Pure.
 
-While a fragment goes on, what its references were chosen for may move or leave. Then the choice is looked at again.
+The blocks of one turn are sent at once: each names the points of the others that it follows. Turns come one after the
+other. While a fragment goes on, what its references were chosen for may move or leave. Then the choice is looked at
+again.
 """
 
-import asyncio
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Generator
 from functools import reduce
-from typing import Literal
+from typing import Any, Literal
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
@@ -15,15 +17,17 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import GazeShift, TurnSignal
 from engage_hri.schemas.blocks import BlockOutcome, InterruptBehavior, PerformBlock
 from engage_hri.schemas.body import AbortBehavior, WordSpoken
-from engage_hri.schemas.faults import EngageError, Fault, RunFailed
+from engage_hri.schemas.faults import EngageError, Fault, RequestRefused, RunFailed, bug
 from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import PerformFragment
+from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.requests import Accepted, Heard
+from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
-from engage_hri.services.bus.interface import Bus, is_asked_to_stop
-from engage_hri.services.generation.body_link import BodyLink
+from engage_hri.services.bus.sight import Sight
+from engage_hri.services.generation.body_link import BodyLink, planned
 from engage_hri.services.generation.choosing_again import (
     barred,
     changed,
@@ -35,6 +39,7 @@ from engage_hri.services.generation.choosing_again import (
     without,
 )
 from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.exchange import CancelRequest, NoAnswer, SendRequest
 from engage_hri.services.generation.fragment_check import check_world, performable
 from engage_hri.services.generation.head.arbiter import Arbiter
 from engage_hri.services.generation.head.inhibitions import Leases
@@ -48,9 +53,10 @@ from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, C
 from engage_hri.services.generation.turns.events import TurnEvents, TurnOutcomes
 from engage_hri.services.generation.turns.heard import HeardWords
 from engage_hri.services.generation.turns.policy import Aborted, TurnPlan, TurnPolicy
+from engage_hri.services.generation.ways import Way, Ways
 from engage_hri.services.requests.deadlines import Silences
-from engage_hri.services.requests.ends import Pending, RequestDesk, Requester, RequestRefused
 from engage_hri.services.requests.serving import GRACE
+from engage_hri.services.runtime.intake import AnswerRequest, MachineClocks, PublishMessage, TellMistake
 
 FRAGMENTS = 200
 """Number of fragments that may be waiting or performed at once; one more is refused, so that a task that never waits
@@ -58,46 +64,48 @@ is told so. Ours."""
 _RECOGNITION_AWAY = ("away", "recognition")
 
 
-class FragmentRunner:
-    """All fragments that wait or are performed. `deadline`: when to call `settle` at the latest."""
+class Fragments:
+    """All fragments that wait or are performed.
+
+    deadline: when to call `settle` at the latest. is_any_paused: true if `go_on` is to be called at once.
+    """
 
     def __init__(
         self,
-        bus: Bus,
+        robot: str,
         config: GenerationConfig,
-        desk: RequestDesk,
-        requests: Requester,
+        clock: MachineClocks,
+        session: str,
+        sight: Sight,
         arbiter: Arbiter,
         leases: Leases,
-        changed: Callable[[Seconds], None],
+        tell: Callable[[Struct], None],
     ) -> None:
-        """changed: called with the time when a fragment has made progress outside `feed` and `settle`."""
-        self._bus = bus
+        """session: part of each request id, so that the ids differ after a restart. tell: called with each output."""
+        self._robot = robot
         self._config = config
-        self._desk = desk
-        self._requests = requests
+        self._clock = clock
+        self._session = session
         self._arbiter = arbiter
         self._leases = leases
-        self._changed = changed
-        self._turns = TurnPolicy(bus.robot, config, bus.sight)
+        self._tell = tell
+        self._now: Seconds = 0.0
+        """Time of this step."""
+        self._turns = TurnPolicy(robot, config, sight)
         self._events = TurnEvents()
         self._heard = HeardWords()
-        self._outcomes = TurnOutcomes(self._events, self._heard, config, bus.sight)
+        self._outcomes = TurnOutcomes(self._events, self._heard, config, sight)
         self._gazes = GazesOfFragments()
-        self._body = BodyLink(bus)
+        self._body = BodyLink()
+        self._ways = Ways(tell)
         self._world: World | None = None
         self._discourse = NO_DISCOURSE
         self._live: dict[str, FragmentPerformance] = {}
-        """Fragments by request id, from `admit` until their outcome is sent."""
-        self._line: asyncio.Queue[FragmentPerformance] = asyncio.Queue()
-        self._blocks: dict[asyncio.Task[None], str] = {}
-        """Tasks that wait for the end of a fragment's block, and the turn of each."""
-        self._news = asyncio.Event()
-        """Set when something has changed, in the world or of a fragment."""
-        self._session = f"{bus.name}@{bus.now():.6f}"
-        """Part of each request id, so that the ids differ after a restart."""
+        """Fragments by request id, in the order in which they came, from `admit` until their outcome is told."""
+        self._is_choosing = False
+        """True while a choice is looked at again."""
         self._signals = 0
-        self._waits = Silences[tuple[str, str]](bus.sight)
+        self._waits = Silences[tuple[str, str]](sight)
         """Times until which recognition may be away, and until which it is to decide the events of a request."""
 
     # -- what arrives ---------------------------------------------------------------------------------------------
@@ -109,24 +117,23 @@ class FragmentRunner:
         reason = f"{number} fragments are waiting or performed, which is the limit"
         return Fault(reason=reason, where=id, advice="wait until one has ended")
 
-    def admit(self, request: PerformFragment, world: World) -> None:
+    def admit(self, request: PerformFragment, world: World, now: Seconds) -> None:
         """Queue a fragment. Raises InputRefused where it is illegal, and changes nothing that goes on."""
-        fragment, lost = performable(request.fragment, world, self._bus.robot)
-        self._abort(self._turns.begins_again(request.requester, request.life), self._bus.now())
+        fragment, lost = performable(request.fragment, world, self._robot)
+        self._abort(self._turns.begins_again(request.requester, request.life), now)
         turn = self._turns.accept(fragment, fragment.addressee, request.requester, request.life)
         performance = FragmentPerformance(request, fragment, turn, self._config.decision_patience)
         performance.warn(lost)
         performance.known = named_objects(fragment, world)
         if (displaced := self._outcomes.expect(fragment.id, turn)) is not None:
-            self._bus.publish(keys.TURN_CLOSED, displaced)
+            self._tell(PublishMessage(keys.TURN_CLOSED, displaced))
         self._events.expect(fragment.id, turn.turn)
-        self._heard.turn_begins(turn.turn, self._bus.now())
+        self._heard.turn_begins(turn.turn, now)
         if any(not each.is_over and each.turn.turn != turn.turn for each in self._live.values()):
             self._accept(performance)
         # A fragment that need not wait for another turn is accepted when its block is: then, if the realizer finds
         # the block impossible, the fragment is refused, too.
         self._live[request.id] = performance
-        self._line.put_nowait(performance)
 
     def refused(self, request: PerformFragment, why: Fault, now: Seconds) -> None:
         """Draw the consequences, for its turn, of a fragment that was refused before it could be admitted."""
@@ -135,7 +142,7 @@ class FragmentRunner:
     def _accept(self, performance: FragmentPerformance) -> None:
         if not performance.accepted:
             performance.accepted = True
-            self._desk.accept(performance.request.id)
+            self._tell(AnswerRequest(Accepted(id=performance.request.id)))
 
     def cancel(self, id: str, why: Fault, now: Seconds) -> None:
         """Cancel the fragment of request `id`, if it is here, and with it the rest of its turn."""
@@ -156,7 +163,7 @@ class FragmentRunner:
                 self._turns.see([person.id for person in message.people], now)
             case ConnectionEvent():
                 self._events.feed(message, now)
-                self._discourse = self._discourse.hearing(message, self._bus.robot)
+                self._discourse = self._discourse.hearing(message, self._robot)
             case ActionBegan() | ActionEnded():
                 self._turns.feed(message, now)
             case SyncPointProgress():
@@ -168,7 +175,7 @@ class FragmentRunner:
             case Utterance():
                 self._heard.feed(message, now)
                 self._turns.hear(
-                    message.actor, message.text, began=self._bus.local(message.began), is_final=message.final,
+                    message.actor, message.text, began=self._clock.local(message.began, now), is_final=message.final,
                     is_line=message.began == message.at,
                 )  # fmt: skip
 
@@ -192,7 +199,6 @@ class FragmentRunner:
         # A fragment that has ended is second choice, but it still hears of its events.
         performance = min(named, key=lambda each: each.is_over)
         performance.feed(progress)
-        self._news.set()
         if performance.signalled_end:
             self._turns.turn_ended(performance.turn.turn)
         self._follow_gaze(performance)
@@ -213,6 +219,10 @@ class FragmentRunner:
     # -- time -----------------------------------------------------------------------------------------------------
 
     @property
+    def is_any_paused(self) -> bool:
+        return self._ways.is_any_paused
+
+    @property
     def deadline(self) -> Seconds | None:
         due = (self._turns.deadline, self._outcomes.deadline, self._waits.earliest)
         return min((each for each in due if each is not None), default=None)
@@ -220,7 +230,6 @@ class FragmentRunner:
     def settle(self, now: Seconds) -> list[tuple[str, Fault]]:
         """End turns and fragments that are over by now. Returns the requests to refuse, each with the reason."""
         refused: list[tuple[str, Fault]] = []
-        self._news.set()
         for id, performance in self._live.items():
             self._waits.keep(("undecided", id), performance.deadline, now)
         due = {*iter(lambda: self._waits.due(now), None)}
@@ -238,12 +247,13 @@ class FragmentRunner:
             elif outcome := performance.outcome(self._events, is_due=("undecided", performance.request.id) in due):
                 self._forget(performance)
                 self._outcomes.end(outcome, performance.turn, now)
-                self._desk.end(replace(outcome, heard=self._heard.of_turn(performance.turn.turn)))
+                heard = self._heard.of_turn(performance.turn.turn)
+                self._tell(AnswerRequest(replace(outcome, heard=heard)))
                 if not performance.turn.backchannel:  # that is said in the other's turn
                     self._heard.turn_ends(now)
         going = {each.turn.turn for each in self._live.values()} | {self._turns.open_turn}
         for closed in self._outcomes.close_due(going, now):
-            self._bus.publish(keys.TURN_CLOSED, closed)
+            self._tell(PublishMessage(keys.TURN_CLOSED, closed))
         self._events.forget({*going, *self._outcomes.turns})
         self._heard.forget({*going, *self._outcomes.turns})
         return refused
@@ -257,194 +267,183 @@ class FragmentRunner:
         for behavior in performance.forbid(permits):
             how: Literal["freeze", "relax"] = "freeze" if self._leases.holds_head else "relax"
             id = f"{performance.block_id}/{behavior}:abort"
-            self._requests.send(keys.BEHAVIOR, AbortBehavior(id=id, block=block, behavior=behavior, how=how))
+            abort = AbortBehavior(id=id, block=block, behavior=behavior, how=how)
+            self._tell(SendRequest(keys.BEHAVIOR, abort))
 
     # -- fragments: those of a turn at once, turns one after the other --------------------------------------------
 
-    async def perform_in_order(self) -> None:
-        """Send each fragment's block as soon as the blocks of other turns have ended.
+    def answer(self, id: str, answer: Message | NoAnswer | None, now: Seconds) -> None:
+        """Take news of a block, or the body's answer: the way that waits for it goes on."""
+        self._now = now
+        self._ways.answer(id, answer)
 
-        The blocks of one turn are sent at once: each names the points of the others that it follows.
+    def go_on(self, now: Seconds) -> None:
+        """Let those go on that have paused."""
+        self._now = now
+        self._ways.go_on()
+
+    def begin(self, now: Seconds) -> bool:
+        """Begin what may begin now: the next fragment, another look at choices. False: there is nothing."""
+        self._now = now
+        if (following := self._next()) is not None:
+            following.has_begun = True
+            self._ways.begin(self._perform(following))
+            return True
+        if self._is_choosing or (changed := next(filter(self._has_changed, self._live.values()), None)) is None:
+            return False
+        self._is_choosing = True
+        self._ways.begin(self._choose_again(changed))
+        return True
+
+    def _next(self) -> FragmentPerformance | None:
+        """The first fragment in line, if its block may be sent now.
+
+        It may once the blocks of other turns have ended, and those of its own turn were accepted with words that will
+        not change any more: words follow on words.
         """
-        async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self._keep_choices(), name="choices")
-            while True:
-                performance = await self._line.get()
-                turn = performance.turn.turn
-                if before := [block for block, its in self._blocks.items() if its != turn]:
-                    await asyncio.wait(before)
-                await self._all_made(turn)
-                if not performance.is_over and (pending := await self._begin(performance)) is not None:
-                    block = tasks.create_task(self._await_end(performance, pending), name=performance.block_id)
-                    self._blocks[block] = turn
-                    block.add_done_callback(self._blocks.pop)
-                with self._bus.containing(f"what follows the beginning of fragment {performance.fragment.id}"):
-                    self._changed(self._bus.now())
+        going = [each for each in self._live.values() if not each.is_over]
+        first = next((each for each in going if not each.has_begun), None)
+        if first is not None and all(
+            each.turn.turn == first.turn.turn and each.is_sent and not each.may_choose_again
+            for each in going
+            if each.has_begun
+        ):
+            return first
+        return None
 
-    async def _begin(self, performance: FragmentPerformance) -> Pending | None:
-        """Plan and send a block of a fragment. Returns its accepted request; None if the fragment has ended."""
+    def _perform(self, performance: FragmentPerformance) -> Way:
+        """All of a fragment: its block and, where a reference is chosen again, those with which it goes on."""
+        try:
+            while not performance.is_over:
+                if not (yield from self._send_block(performance)):
+                    return  # cancelled meanwhile
+                outcome = yield performance.block_id
+                if not isinstance(outcome, BlockOutcome):
+                    reason = f"the realizer answered {type(outcome).__name__}"
+                    raise RunFailed(Fault(reason=reason, where=performance.block_id))
+                performance.end_with(outcome, self._now)
+                self._follow_end(performance)
+        except RequestRefused as error:
+            performance.refuse(error.fault, self._now)
+        except EngageError as error:
+            performance.fail(error, self._now)
+        except Exception as error:
+            what = f"fragment {performance.fragment.id}"
+            self._tell(TellMistake(error, what))
+            performance.fail(RunFailed(bug(error, what, "generation")), self._now)
+        self._block_ended(performance)
+
+    def _send_block(self, performance: FragmentPerformance) -> Generator[Any, Any, bool]:
+        """Plan and send a block of a fragment, until it is accepted. False: the fragment was cancelled meanwhile."""
         fragment, turn = performance.left, performance.turn_left
         self._arbiter.stop_thinking()
         self._arbiter.speak_to(turn.addressee)
         permits = self._leases.permits
-        try:
-            while True:
-                followed = [each for each in self._live.values() if each.goes_on_with(performance)]
-                moving = [behavior for each in followed for behavior in each.moving]
-                glanced = glance(fragment, turn, self._config)
-                motions = await self._body.motions(targets(fragment), permits().only_hand, moving, glanced)
-                if performance.is_over:  # cancelled meanwhile
-                    return None
-                assert self._world is not None
-                world = remembered(self._world, performance.known)
-                fragment, lost = bearable(fragment, world, self._bus.robot)
-                performance.warn(lost)
-                check_world(fragment, world, self._bus.robot)  # it may have changed while the fragment waited
-                bars = barred(targets(fragment), self._world, performance.known, performance.barred)
-                body = self._body.capabilities
-                if body is not None:
-                    self._arbiter.gaze_perceived_within(body.gaze_half_angle)
-                before = reduce(Continuation.then, (each.continuation for each in followed), NO_CONTINUATION)
-                heard, permitted, config = self._heard_in(turn), permits(), self._config
-                reachable = without(motions, bars)
-                try:
-                    made = await self._body.planned(
-                        planning(fragment, turn, world, body, reachable, permitted, config, before, heard)
-                    )
-                except Unreferable:
-                    if (freed := with_other_words(fragment, bars)) is None:
-                        raise
-                    fragment = performance.left = freed  # the author has no phrase that is enough without a gesture
-                    continue
-                if performance.is_over:  # cancelled meanwhile
-                    return None
-                if permits() != permitted:
-                    continue  # what was inhibited meanwhile is not begun
-                performance.begin(made)
-                performance.world = world
-                pending = await self._send_block(performance, followed)
-                named = [mention.object for mention in made.mentions]
-                self._discourse = self._heard_in(turn).naming(fragment.id, named)
-                performance.is_sent = True
-                self._news.set()
-                return pending
-        except RequestRefused as error:
-            performance.refuse(error.fault, self._bus.now())
-        except EngageError as error:
-            performance.fail(error, self._bus.now())
-        except (Exception, asyncio.CancelledError) as error:
-            if is_asked_to_stop():
-                raise
-            fault = self._bus.failed(error, f"fragment {fragment.id}")
-            performance.fail(RunFailed(fault), self._bus.now())
-        self._block_ended(performance)
-        return None
+        while True:
+            followed = [each for each in self._live.values() if each.goes_on_with(performance)]
+            moving = [behavior for each in followed for behavior in each.moving]
+            glanced = glance(fragment, turn, self._config)
+            motions = yield from self._body.motions(targets(fragment), permits().only_hand, moving, glanced)
+            if performance.is_over:
+                return False
+            assert self._world is not None
+            world = remembered(self._world, performance.known)
+            fragment, lost = bearable(fragment, world, self._robot)
+            performance.warn(lost)
+            check_world(fragment, world, self._robot)  # it may have changed while the fragment waited
+            bars = barred(targets(fragment), self._world, performance.known, performance.barred)
+            body = self._body.capabilities
+            if body is not None:
+                self._arbiter.gaze_perceived_within(body.gaze_half_angle)
+            before = reduce(Continuation.then, (each.continuation for each in followed), NO_CONTINUATION)
+            heard, permitted, config = self._heard_in(turn), permits(), self._config
+            reachable = without(motions, bars)
+            try:
+                made = yield from planned(
+                    planning(fragment, turn, world, body, reachable, permitted, config, before, heard)
+                )
+            except Unreferable:
+                if (freed := with_other_words(fragment, bars)) is None:
+                    raise
+                fragment = performance.left = freed  # the author has no phrase that is enough without a gesture
+                continue
+            if performance.is_over:
+                return False
+            if permits() == permitted:
+                break  # else something is inhibited now that would be begun
+        performance.begin(made)
+        performance.world = world
+        self._turns.fragment_begins(turn.turn)
+        if not performance.accepted:  # From here on the robot may speak.
+            self._tell(AnswerRequest(Heard(id=performance.request.id)))
+        follows = tuple([each.fragment.id for each in followed])
+        request = PerformBlock(id=performance.block_id, block=made.block, follows=follows)
+        self._tell(SendRequest(keys.BLOCK, request))
+        yield performance.block_id
+        self._accept(performance)
+        for message in performance.new_warnings():
+            warning = WarningFeedback(block=performance.fragment.id, kind="POLICY", message=message)
+            self._tell(PublishMessage(keys.FRAGMENT_FEEDBACK, warning))
+        named = [mention.object for mention in made.mentions]
+        self._discourse = self._heard_in(turn).naming(fragment.id, named)
+        performance.is_sent = True
+        return True
 
     def _heard_in(self, turn: TurnPlan) -> Discourse:
         """The discourse at the start of `turn`. A backchannel is said in the other's turn, and changes nothing."""
         return self._discourse if turn.backchannel else self._discourse.in_turn(turn.turn, turn.addressee)
 
-    async def _send_block(self, performance: FragmentPerformance, followed: Iterable[FragmentPerformance]) -> Pending:
-        """Send the block and wait until it is accepted. followed: fragments without which it fails, too."""
-        assert performance.plan is not None
-        request = PerformBlock(
-            id=performance.block_id,
-            block=performance.plan.block,
-            follows=tuple([each.fragment.id for each in followed]),
-        )
-        self._turns.fragment_begins(performance.turn.turn)
-        if not performance.accepted:  # From here on the robot may speak.
-            self._desk.hear(performance.request.id)
-        pending = self._requests.send(keys.BLOCK, request)
-        await pending.accepted
-        self._accept(performance)
-        for message in performance.new_warnings():
-            warning = WarningFeedback(block=performance.fragment.id, kind="POLICY", message=message)
-            self._bus.publish(keys.FRAGMENT_FEEDBACK, warning)
-        return pending
-
-    async def _await_end(self, performance: FragmentPerformance, pending: Pending) -> None:
-        """Wait for the end of a fragment: of its block, and of those with which it goes on after a new choice."""
-        try:
-            outcome = await pending.outcome
-            while True:
-                if not isinstance(outcome, BlockOutcome):
-                    reason = f"the realizer answered {type(outcome).__name__}"
-                    raise RunFailed(Fault(reason=reason, where=performance.block_id))
-                performance.end_with(outcome, self._bus.now())
-                if performance.is_over:
-                    break
-                self._follow_gaze(performance)
-                self._discourse = self._discourse.without(performance.fragment.id, performance.unmentioned)
-                if (following := await self._begin(performance)) is None:
-                    return
-                outcome = await following.outcome
-        except EngageError as error:
-            performance.fail(error, self._bus.now())
-        with self._bus.containing(f"the end of fragment {performance.fragment.id}"):
-            self._block_ended(performance)
-            self._changed(self._bus.now())
-
     # -- references, chosen again while their fragments go on -----------------------------------------------------
-
-    async def _all_made(self, turn: str) -> None:
-        """Wait until no reference of the turn's fragments under way is chosen again: words follow on words."""
-        while any(each.acts and each.may_choose_again for each in self._live.values() if each.turn.turn == turn):
-            await self._changes()
-
-    async def _keep_choices(self) -> None:
-        """Choose again where objects have moved or left since the choice, until cancelled."""
-        while True:
-            for performance in list(self._live.values()):
-                if self._has_changed(performance):
-                    with self._bus.containing(f"another choice for fragment {performance.fragment.id}"):
-                        await self._choose_again(performance)
-            await self._changes()
-
-    async def _changes(self) -> None:
-        if self._news.is_set():
-            self._news = asyncio.Event()
-        await self._news.wait()
 
     def _has_changed(self, performance: FragmentPerformance) -> bool:
         then, now = performance.world, self._world
         is_going_on = performance.plan is not None and performance.is_sent and not performance.is_over
         return is_going_on and then is not None and now is not None and changed(performance.acts[-1], then, now)
 
-    async def _choose_again(self, performance: FragmentPerformance) -> None:
+    def _choose_again(self, performance: FragmentPerformance) -> Way:
         """Take out the gestures of the first reference that would be made otherwise in the world as it is now.
 
         What needs them falls, and the rest of the fragment is performed by another block.
         """
-        act, turn, now = performance.acts[-1], performance.turn_left, self._world
-        assert now is not None
-        performance.world = world = remembered(now, performance.known)
-        fragment = open_references(performance.left, act)
-        bars = barred(targets(fragment), now, performance.known, performance.barred)
-        permits, body = self._leases.permits(), self._body
         try:
-            motions = without(await body.motions(targets(fragment), permits.only_hand), bars)
-            made = await body.planned(
-                planning(fragment, turn, world, body.capabilities, motions, permits, self._config)
-            )
-            choices = made.choices
-        except Unreferable:
-            choices = ()
+            act, turn, now = performance.acts[-1], performance.turn_left, self._world
+            assert now is not None
+            performance.world = world = remembered(now, performance.known)
+            fragment = open_references(performance.left, act)
+            bars = barred(targets(fragment), now, performance.known, performance.barred)
+            permits, body = self._leases.permits(), self._body
+            try:
+                motions = yield from body.motions(targets(fragment), permits.only_hand)
+                plan = planning(
+                    fragment, turn, world, body.capabilities, without(motions, bars), permits, self._config
+                )
+                choices = (yield from planned(plan)).choices
+            except Unreferable:
+                choices = ()
+            if performance.is_over or performance.plan is None or performance.acts[-1] is not act:
+                return
+            for gesture in first_that_differs(act, choices, bars):
+                id = f"{performance.block_id}/{gesture}:again"
+                interrupt = InterruptBehavior(id=id, block=performance.fragment.id, behavior=gesture)
+                self._tell(SendRequest(keys.BLOCK, interrupt))
         except EngageError:
-            return  # the body does not answer: the realizer will tell
-        if performance.is_over or performance.plan is None or performance.acts[-1] is not act:
-            return
-        for gesture in first_that_differs(act, choices, bars):
-            id = f"{performance.block_id}/{gesture}:again"
-            self._requests.send(keys.BLOCK, InterruptBehavior(id=id, block=performance.fragment.id, behavior=gesture))
+            pass  # the body does not answer: the realizer will tell
+        except Exception as error:
+            self._tell(TellMistake(error, f"another choice for fragment {performance.fragment.id}"))
+        finally:
+            self._is_choosing = False
 
     # -- ends -----------------------------------------------------------------------------------------------------
 
-    def _block_ended(self, performance: FragmentPerformance) -> None:
-        """Draw the consequences of a block that has ended, or that will never be, for turn, head and discourse."""
-        now, fragment = self._bus.now(), performance.fragment
+    def _follow_end(self, performance: FragmentPerformance) -> None:
+        """Draw the consequences of the end of a block for head and discourse."""
         self._follow_gaze(performance)
-        self._discourse = self._discourse.without(fragment.id, performance.unmentioned)
+        self._discourse = self._discourse.without(performance.fragment.id, performance.unmentioned)
+
+    def _block_ended(self, performance: FragmentPerformance) -> None:
+        """Draw the consequences of a block that has ended, or that will never be, for its turn, too."""
+        now, fragment = self._now, performance.fragment
+        self._follow_end(performance)
         if performance.refusal is not None:
             aborted = self._turns.fragment_refused(fragment.id, now, performance.refusal)
         else:
@@ -460,7 +459,7 @@ class FragmentRunner:
             if performance.is_over or performance.fragment.id not in fragments:
                 continue
             if performance.plan is not None:
-                self._requests.cancel(performance.block_id, why)
+                self._tell(CancelRequest(performance.block_id, why))
             else:
                 performance.end(Ended(now, "interrupted", fault=why.at(performance.fragment.id)))
 
@@ -476,5 +475,5 @@ class FragmentRunner:
         self._signals += 1
         id = f"turn-aborted-{self._signals}"
         signal = TurnSignal(id=id, turn=aborted.turn, signal="aborted", actor=aborted.addressee)
-        request = SignalTurn(id=f"{self._session}/{id}", signal=signal, at=self._bus.stamp(now))
-        self._requests.send(keys.TURN, request)
+        request = SignalTurn(id=f"{self._session}/{id}", signal=signal, at=Stamp(self._clock.name, now))
+        self._tell(SendRequest(keys.TURN, request))

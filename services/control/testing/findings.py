@@ -1,76 +1,18 @@
-"""One behavior that a law is judged by, the connection of the body meanwhile, and what went wrong in words."""
+"""Findings in words: what went wrong with a body. Pure."""
 
-import asyncio
 import traceback
-from collections.abc import Sequence, Set
-from contextlib import suppress
+from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Any
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.faults import EngageError
 from engage_hri.services.control.bases.error_place import place_of, words_of
-from engage_hri.services.control.contract.body import BehaviorRefused, Body, BodyFailed
-from engage_hri.services.control.testing.laws import Finding, LawBroken, named
-from engage_hri.services.control.testing.stage import PATIENCE, Stage
+from engage_hri.services.control.contract.body import BehaviorRefused, BodyFailed
+from engage_hri.services.control.testing.laws import Finding, LawBroken
 from engage_hri.services.runtime.virtual_time import Deadlock, TimeRanOut
 
 _SUITE = str(Path(__file__).parent)
-
-
-class Case:
-    """One behavior that a law is judged by. Whatever is wrong inside of its `async with` is a finding."""
-
-    def __init__(self, body: Body, behavior: BlockBehavior, findings: list[Finding]) -> None:
-        self._body, self._behavior = body, behavior
-        self._findings = findings
-
-    async def __aenter__(self) -> BlockBehavior:
-        return self._behavior
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> bool:
-        if error is None:
-            return False
-        findings = findings_of(error, named(self._behavior))
-        if findings is None:
-            return False
-        self._findings += findings
-        await Stage.end_all()
-        with suppress(Exception):
-            async with asyncio.timeout(PATIENCE):
-                await self._body.home()
-        return True
-
-
-class Connection:
-    """A task that a body is connected in: what is entered in a task has to be left in the same."""
-
-    def __init__(self, body: Body) -> None:
-        self._body = body
-        self._is_open = asyncio.Event()
-        self._leave = asyncio.Event()
-        self._task = asyncio.create_task(self._stay(), name="connection of the body")
-
-    async def _stay(self) -> None:
-        async with self._body.connected():
-            self._is_open.set()
-            await self._leave.wait()
-
-    async def enter(self) -> None:
-        opening = asyncio.create_task(self._is_open.wait())
-        await asyncio.wait([opening, self._task], return_when=asyncio.FIRST_COMPLETED)
-        opening.cancel()
-        if self._task.done():
-            self._task.result()
-
-    async def leave(self) -> None:
-        self._leave.set()
-        await self._task
 
 
 def findings_of(error: BaseException, behavior: str = "") -> Sequence[Finding] | None:
@@ -139,11 +81,3 @@ def _beyond_the_suite(error: BaseException) -> Sequence[traceback.FrameSummary]:
     frames = traceback.extract_tb(error.__traceback__)
     last = max((number for number, each in enumerate(frames) if each.filename.startswith(_SUITE)), default=-1)
     return frames[last + 1 :]
-
-
-async def still_running(before: Set["asyncio.Task[Any]"]) -> list["asyncio.Task[Any]"]:
-    """List tasks that have come since `before`, and do not end by themselves now."""
-    for _ in range(3):
-        await asyncio.sleep(0)
-    came = asyncio.all_tasks() - before - {asyncio.current_task()}
-    return sorted((task for task in came if not task.done()), key=lambda task: task.get_name())

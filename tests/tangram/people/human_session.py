@@ -12,6 +12,7 @@ while the listener carries out a detailed task after a request and hardly answer
 """
 
 from collections.abc import Iterable, Iterator, Sequence
+from random import Random
 
 import msgspec
 from msgspec import Struct
@@ -21,8 +22,7 @@ from engage_hri.schemas.behaviors import Action, Event, EventKind, TurnSignal
 from engage_hri.schemas.recognition import RequestEvent, SignalTurn
 from engage_hri.schemas.units import Probability, Seconds, Stamp
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.tangram.people.chance import Chance
-from engage_hri.services.tangram.people.table_2_1 import TABLE
+from tests.tangram.people.table_2_1 import TABLE
 
 Observation = World | ActorFound | ActionBegan | ActionEnded | RequestEvent | SignalTurn
 
@@ -102,7 +102,7 @@ class Planned(Struct, frozen=True, kw_only=True):
 USUAL = Pace()
 
 
-def draw(chance: Chance, pace: Pace = USUAL) -> tuple[Planned, ...]:
+def draw(chance: Random, pace: Pace = USUAL) -> tuple[Planned, ...]:
     """Draw a session with as many events of each kind as the table has, in random order."""
     kinds = [kind for kind, row in TABLE.items() for _ in range(row.count)]
     chance.shuffle(kinds)
@@ -133,7 +133,7 @@ def _next_kind(kinds: list[EventKind], *, busy: bool) -> EventKind:
     return kinds.pop(index)
 
 
-def _event(kind: EventKind, number: int, start: Seconds, chance: Chance, answers: Probability | None) -> Planned:
+def _event(kind: EventKind, number: int, start: Seconds, chance: Random, answers: Probability | None) -> Planned:
     """Draw an event. answers: share of answers of a busy listener, who begins no event either; None if engaged."""
     row = TABLE[kind]
     succeeds = kind == "backchannel" or chance.random() < row.success * (1.0 if answers is None else answers)

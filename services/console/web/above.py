@@ -1,4 +1,4 @@
-"""The scene seen from above: the one projection of the map of the window and of the pictures of a recording. Pure.
+"""The scene seen from above: the projection of the map of the window. Pure.
 
 It is the view of the person opposite the robot: the robot is at the top, and its left is on the right.
 """
@@ -65,15 +65,6 @@ def frame(entities: Iterable[Entity], people: Iterable[Vector]) -> PictureEdges:
         right=max([LEAST.right, *(right for _, right, _ in steps)]),
         bottom=max([LEAST.bottom, *(down for _, _, down in steps)]),
     )
-
-
-def together(frames: Iterable[PictureEdges]) -> PictureEdges:
-    """Frame that has all of these in it."""
-    found = [LEAST, *frames]
-    return PictureEdges(
-        min(each.left for each in found), min(each.top for each in found),
-        max(each.right for each in found), max(each.bottom for each in found),
-    )  # fmt: skip
 
 
 def _up(value: Meters) -> Meters:
