@@ -63,7 +63,7 @@ async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: No
 
 
 async def while_alone(bus: Bus, work: Coroutine[Any, Any, None]) -> None:
-    """Do the work until it ends, or another participant of this name has precedence. Raises NotReady then.
+    """Wait for the end of the work, or until another participant of this name has precedence: then raise NotReady.
 
     One that starts while another is there is refused before it begins. So two of one name have started at once, or
     without seeing one another, as behind a cut. Neither knows who was first; the one of the lesser run stays.

@@ -21,9 +21,8 @@ from engage_hri.services.commandline.shell.outputs import Terminal
 from engage_hri.services.commandline.shell.process import DONE, FAILED, interrupted, run
 from engage_hri.services.commandline.shell.result_folder import Folder
 from engage_hri.services.commandline.shell.settings import TRANSCRIPT
-from engage_hri.services.commandline.study.progress import ProgressReport
 from engage_hri.services.commandline.study.session import Order, SessionResult
-from engage_hri.services.commandline.study.tables import PLOTS, Draw, plotting, rendered
+from engage_hri.services.commandline.study.tables import PLOTS, Draw, plotting, rendered, session_line
 from engage_hri.services.commandline.study.workers import play_all
 from engage_hri.services.runtime.service import installed_version
 from engage_hri.services.study import files, summary
@@ -81,16 +80,15 @@ def main(options: Options) -> int:
     console = Terminal(quiet=options.quiet)
     played: list[SessionResult] = []
     is_broken_off = False
-    with ProgressReport(console, len(orders)) as report:
 
-        def tell(one: SessionResult) -> None:
-            played.append(one)
-            report(one.record)
+    def tell(one: SessionResult) -> None:
+        played.append(one)
+        console.print(f"{len(played)} of {len(orders)}: {session_line(one.record)}", highlight=False, soft_wrap=True)
 
-        try:
-            run(play_all(orders, options.jobs or os.cpu_count() or 1, tell))
-        except KeyboardInterrupt:
-            is_broken_off = True
+    try:
+        run(play_all(orders, options.jobs or os.cpu_count() or 1, tell))
+    except KeyboardInterrupt:
+        is_broken_off = True
     if played:
         place = {(order.condition, order.session): number for number, order in enumerate(orders)}
         played.sort(key=lambda one: place[one.record.condition, one.record.session])

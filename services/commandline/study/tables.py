@@ -39,3 +39,10 @@ def grid(table: NumberTable) -> RichTable:
     for row in table.rows:
         made.add_row(*map(Text, row))
     return made
+
+
+def session_line(record: SessionRecord) -> str:
+    """Result of a session: `operational 3: 155 s, 97 connection events`."""
+    came_to = f"{record.duration:.0f} s, {record.statistics.events} connection events"
+    name = f"{record.condition} {record.session}"
+    return f"{name}: {came_to}" if record.finished else f"{name}: not finished: {record.reason} ({came_to})"
