@@ -62,7 +62,7 @@ LAYERS = {
     "services": "commandline > console control doctor generation realizer recognition study > tangram"
     " > simulation > client > recording > reports requests > runtime > bus > text",
     "services/text": "ear > marks > pieces > patterns > acts ends listening > abbreviations",
-    "services/bus": "memory zenoh > answering > interface > payloads subscription > samples often sight"
+    "services/bus": "memory zenoh > answering certificates > interface > payloads subscription > samples often sight"
     " > config journal keyring",
     "services/control": "mujoco > reachy_mini service testing torso > bases calibrating serving > figure voice"
     " > contract > config motion",

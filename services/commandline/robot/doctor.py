@@ -36,7 +36,7 @@ def main(options: Options) -> int:
 
 
 async def _examine(bus: BusConfig, is_json: bool) -> int:
-    from engage_hri.services.commandline.robot.examine import examining
+    from engage_hri.services.doctor.service import examining
 
     async with examining(bus) as facts:
         found = findings(facts)

@@ -9,6 +9,7 @@ import platform
 import socket
 import ssl
 import time
+import uuid
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, suppress
 from importlib.metadata import version
@@ -30,7 +31,6 @@ from engage_hri.services.bus.keyring import HOLDERS, WHO, Keys, Who, read_keys
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
 from engage_hri.services.bus.zenoh.neighbors import protocols, robots
 from engage_hri.services.bus.zenoh.session import RENDEZVOUS, ROUTER_WITH_KEYS
-from engage_hri.services.commandline.shell.process import unique_name
 from engage_hri.services.doctor.facts import (
     BodyFacts,
     Certificate,
@@ -103,7 +103,7 @@ def _itself() -> ProcessFacts:
 
 async def _look_around(hub: ZenohHub, facts: SystemFacts, endpoints: tuple[str, ...]) -> SystemFacts:
     """Add what can be learned on the bus."""
-    bus = hub.join(unique_name("doctor"), "observer")
+    bus = hub.join(f"doctor-{uuid.uuid4().hex[:8]}", "observer")
     hub.peers.see(keys.ANY_ALIVE)
     with suppress(TimeoutError):
         async with asyncio.timeout(COME):
