@@ -19,13 +19,12 @@ from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.options import Configured, Quiet, Resolution, simulation_settings
 from engage_hri.services.commandline.shell.outputs import Terminal
 from engage_hri.services.commandline.shell.process import DONE, FAILED, interrupted, run
-from engage_hri.services.commandline.shell.result_folder import Folder
 from engage_hri.services.commandline.shell.settings import TRANSCRIPT
 from engage_hri.services.commandline.study.session import Order, SessionResult
-from engage_hri.services.commandline.study.tables import PLOTS, Draw, plotting, rendered, session_line
+from engage_hri.services.commandline.study.tables import StudyReport, session_line
 from engage_hri.services.commandline.study.workers import play_all
 from engage_hri.services.runtime.service import installed_version
-from engage_hri.services.study import files, summary
+from engage_hri.services.study import summary
 from engage_hri.services.study.conditions import CONDITIONS, DEGRADATIONS
 from engage_hri.services.study.hypotheses import HypothesisResult, findings
 from engage_hri.services.study.records import SessionRecord
@@ -42,7 +41,6 @@ DECIDED = {
     "generation.condition": "--condition",
 }
 """Keys that are set for each session, with the option for each."""
-FILES = ("study.json", "events.csv", "sessions.csv", "hypotheses.csv", "summary.md", "failures.txt", *PLOTS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,10 +72,9 @@ class Options(Configured):
 
 
 def main(options: Options) -> int:
-    draw = plotting()
     orders = orders_of(options)
-    folder = Folder(options.out, FILES, overwrite=options.overwrite)
     console = Terminal(quiet=options.quiet)
+    report = StudyReport(console, options.out, ("study.json", "failures.txt"), overwrite=options.overwrite)
     played: list[SessionResult] = []
     is_broken_off = False
 
@@ -95,11 +92,8 @@ def main(options: Options) -> int:
         records = [one.record for one in played]
         found = findings(records)
         ordered = Counter(order.condition for order in orders)
-        tables = tables_of(records, found, ordered)
-        folder.write(contents(options, orders, played, found, tables, draw))
-        for table in tables:
-            console.print("", rendered(table), sep="\n")
-        console.print(f"\nresults in {options.out}", markup=False, highlight=False, soft_wrap=True)
+        events = [event for one in played for event in one.events]
+        report.end(records, events, found, tables_of(records, found, ordered), texts_of(options, orders, played))
     if is_broken_off:
         return interrupted()
     return DONE if all(one.record.finished for one in played) else FAILED
@@ -148,30 +142,15 @@ def tables_of(
     return tables
 
 
-def contents(
-    options: Options,
-    orders: Sequence[Order],
-    played: Sequence[SessionResult],
-    found: Sequence[HypothesisResult],
-    tables: Sequence[NumberTable],
-    draw: Draw,
-) -> dict[str, bytes]:
-    """Results by file name. Nothing in them depends on the number of processes."""
-    records = [one.record for one in played]
-    events = [event for one in played for event in one.events]
-    texts = {
-        "events.csv": files.events(events),
-        "sessions.csv": files.sessions(records),
-        "summary.md": "\n".join(table.markdown() for table in tables),
-        "study.json": msgspec.json.format(msgspec.json.encode(_study(options, orders, len(played)))).decode() + "\n",
-    }
-    if found:
-        texts["hypotheses.csv"] = files.findings(found)
-    if failed := [one for one in played if one.trace]:
-        texts["failures.txt"] = "\n".join(
-            f"{one.record.condition} {one.record.session}, seed {one.record.seed}\n{one.trace}" for one in failed
-        )
-    return {name: text.encode() for name, text in texts.items()} | draw(records, events)
+def texts_of(options: Options, orders: Sequence[Order], played: Sequence[SessionResult]) -> dict[str, str]:
+    """Files that only simulated sessions have. Nothing in them depends on the number of processes."""
+    told = msgspec.json.format(msgspec.json.encode(_study(options, orders, len(played)))).decode() + "\n"
+    failed = [
+        f"{one.record.condition} {one.record.session}, seed {one.record.seed}\n{one.trace}"
+        for one in played
+        if one.trace
+    ]
+    return {"study.json": told, **({"failures.txt": "\n".join(failed)} if failed else {})}
 
 
 class Study(Struct, frozen=True, kw_only=True):
