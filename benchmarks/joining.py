@@ -120,7 +120,7 @@ async def measure(numbers: list[int], *, with_keys: bool) -> list[dict[str, Any]
         ring: list[str] = []
         endpoint = free_endpoint()
         if with_keys:
-            from engage_hri.services.commandline.robot.certificates import initialize
+            from engage_hri.services.bus.certificates import initialize
 
             ring = ["--keys", stack.enter_context(tempfile.TemporaryDirectory()) + "/keys"]
             crowds = [("manager", f"crowd{each}") for each in range(-(-max(numbers) // TOGETHER))]

@@ -29,11 +29,11 @@ from engage_hri.services.realizer.points import EPSILON, Point
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.service import Service, running
 from engage_hri.services.runtime.virtual_time import run_virtual
-from engage_hri.services.simulation.still import tangram_world
+from engage_hri.services.simulation.still import table_world
 from tests.random_cases import share_of
 from tests.schemas.grammar import violations
 
-WORLD = tangram_world()
+WORLD = table_world()
 OBJECTS = [entity.id for entity in WORLD.entities if entity.kind == "object"]
 FEW = settings(max_examples=share_of(50), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 MISESTIMATED: Seconds = 2.0

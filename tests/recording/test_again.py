@@ -25,7 +25,7 @@ from engage_hri.services.recording.disk import read
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.service import serve
-from engage_hri.services.simulation.config import SimulationConfig
+from engage_hri.services.tangram.people.config import SimulationConfig
 from tests.recording.runs import recording_to, tangram
 
 PEOPLE = ("ann", "bob", "cleo")
@@ -39,7 +39,7 @@ def test_the_anchor_scenario_gives_the_same_events(task: Recording) -> None:
     assert life.lack.is_nothing
     assert len(life.live) > 200
     assert life.live == life.again
-    assert lives.keys() == {"control", "generation"}
+    assert lives.keys() == {"control", "generation", "realizer"}
     for other in lives.values():
         assert (other.is_same, other.lack.is_nothing) == (True, True)
         assert other.steps > 1000

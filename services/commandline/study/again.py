@@ -19,9 +19,9 @@ from engage_hri.schemas.ledger import Step, Taken
 from engage_hri.schemas.recognition import ConnectionEvent, session_of
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.samples import Received
-from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.commandline.shell.process import DONE
 from engage_hri.services.commandline.shell.recording_file import opened
+from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.commandline.study.realizer_again import OtherWords, Said, compared, played
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.serving.intake import ControlIntake
@@ -34,6 +34,7 @@ from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.settings import flat, settings_of
 from engage_hri.services.runtime.again import Again, Find, Lack, StepDifference
+from engage_hri.services.runtime.configuration import read
 from engage_hri.services.runtime.intake import Intake, PublishMessage
 from engage_hri.services.runtime.ledger import StepClock
 
@@ -245,7 +246,7 @@ def _numbers(recording: Recording) -> dict[tuple[str, int], int]:
 def with_settings(service: str, config: Struct, settings: Sequence[str]) -> Struct:
     """The same with other settings, `SERVICE.KEY=VALUE`. Raises InputRefused."""
     had = [f"{key}={value}" for key, value in flat(msgspec.to_builtins(config), f"{service}.") if value]
-    changed: Struct = getattr(load(settings=settings, defaults=had), service)
+    changed: Struct = getattr(read(RobotConfig, settings=settings, defaults=had), service)
     return changed
 
 

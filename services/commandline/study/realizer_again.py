@@ -28,7 +28,7 @@ from engage_hri.schemas.messages import Message, in_form
 from engage_hri.schemas.requests import KeepAlive
 from engage_hri.schemas.status import BusHealth
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.bus.interface import CAPACITY, Answer, Bus, Keep, Subscription, Tap
+from engage_hri.services.bus.interface import Answer, Bus, Subscription, Tap
 from engage_hri.services.bus.samples import Received
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.inputs import BodyAnswered, RealizerInput, behaviors_asked
@@ -67,14 +67,13 @@ class PlayedBus(Bus):
         super().__init__(robot, name, "", clock.name, run, lives)
         self.said: list[Said] = []
         self._known = clock
-        self._readers: list[Subscription] = []
         self._asked = Counter[str]()
         self._answers: dict[tuple[str, int], asyncio.Future[BodyAnswered]] = {}
 
     def give(self, received: Received) -> None:
         """Have it receive a message."""
         for reader in self._readers:
-            if reader.wants(received.key):
+            if isinstance(reader, Subscription) and reader.wants(received.key):
                 reader.offer(received)
 
     def give_answer(self, answered: BodyAnswered) -> None:
@@ -116,12 +115,11 @@ class PlayedBus(Bus):
     def is_heard(self, key: str) -> bool:
         return False
 
-    def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:
-        self._readers.append(reader := Subscription(patterns, keep, capacity, self._readers.remove))
-        return reader
+    def _attach(self, reader: Subscription | Tap) -> None:
+        pass
 
-    def tap(self, *patterns: str, capacity: int = CAPACITY) -> Tap:
-        raise NotImplementedError("nobody records what is played")
+    def _detach(self, reader: Subscription | Tap) -> None:
+        pass
 
     def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
         pass
