@@ -15,7 +15,7 @@ CHOSEN := -m "not long"
 demo: $(DEMO)
 	@$(BIN)/engage demo $(ARGS)
 
-# Less than seven minutes on two processors: all but the long share (tests/long_share.py). mypy keeps one processor busy for as long as
+# About four minutes on two processors: all but the long share (tests/long_share.py). mypy keeps one processor busy for as long as
 # others would wait for it: it runs beside the tests.
 test: style
 	@$(BIN)/mypy --no-error-summary & types=$$!; \
@@ -100,7 +100,7 @@ $(DEMO): pyproject.toml constraints.txt
 	test -n "$$python" || { echo "engage needs Python >= 3.11 with venv (Debian: apt install python3-venv)" >&2; exit 1; }; \
 	$(BIN)/python -m pip --version >/dev/null 2>&1 \
 		|| { echo "making .venv (once, about a minute)"; "$$python" -m venv --clear .venv; }
-	@$(PIP) -e '.[check,console,record,speed,voice]'
+	@$(PIP) -e '.[check,tangram]'
 	@touch $@
 
 $(READY): $(DEMO)

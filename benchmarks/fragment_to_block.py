@@ -68,7 +68,7 @@ from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.service import recognize
 from engage_hri.services.requests.ends import RequestDesk, Requester
 from engage_hri.services.runtime.service import Service, running
-from engage_hri.services.simulation.still import tangram_world
+from engage_hri.services.simulation.still import table_world
 
 HERE = Path(__file__).resolve().parents[1]
 ROBOT = "measured"
@@ -118,7 +118,7 @@ class Trips:
         self._bus, self._realizer = client, realizer
         self._requests = Requester(client)
         self._which, self._number = which, number
-        self._world = table() if which == "hundred" else tangram_world()
+        self._world = table() if which == "hundred" else table_world()
         self._chance = random.Random(number)
         self._names = count()
         self.steps: list[dict[str, Any]] = []
@@ -277,7 +277,7 @@ async def measured(how: str, which: str, number: int, trips: int, watch: Stopwat
         there.close()
         fragments = Trips(client, realizer, which, number)
         if how == "load":
-            looking = asyncio.create_task(crowd(client, tangram_world()))
+            looking = asyncio.create_task(crowd(client, table_world()))
             stack.callback(looking.cancel)
         for _ in range(2 if how != "load" else 0):
             await fragments.set_up()

@@ -35,7 +35,8 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.keyring import Keys, read_keys
 from engage_hri.services.bus.zenoh.hub import open_hub
-from engage_hri.services.client.robot import Robot, connect
+from engage_hri.services.client.connection import connect
+from engage_hri.services.client.robot import Robot
 from engage_hri.services.commandline.shell.process import run
 
 ROBOT = "robot"
@@ -119,7 +120,7 @@ async def measure(numbers: list[int], *, with_keys: bool) -> list[dict[str, Any]
         ring: list[str] = []
         endpoint = free_endpoint()
         if with_keys:
-            from engage_hri.services.commandline.robot.certificates import initialize
+            from engage_hri.services.bus.certificates import initialize
 
             ring = ["--keys", stack.enter_context(tempfile.TemporaryDirectory()) + "/keys"]
             crowds = [("manager", f"crowd{each}") for each in range(-(-max(numbers) // TOGETHER))]

@@ -88,7 +88,7 @@ async def route(kind: str, endpoint: str, ring: str) -> None:
 
 
 async def measure(laps: int, trips: int, as_json: bool) -> None:
-    from engage_hri.services.commandline.robot.certificates import initialize
+    from engage_hri.services.bus.certificates import initialize
 
     with ExitStack() as processes, tempfile.TemporaryDirectory() as folder:
         ring = str(Path(folder, "keys"))

@@ -196,8 +196,11 @@ PARTICIPANTS = {**{name: name for name in keys.SERVICES}, "simulation": "percept
 
 
 def role_of(name: str) -> str:
-    """Role of a participant of this name who was given none: that of the service, or a manager's."""
-    return PARTICIPANTS.get(name, "manager")
+    """Role of a participant of this name who was given none: that of the service, or a manager's.
+
+    Those who only start a robot, as `up`, observe it.
+    """
+    return "observer" if name == "up" else PARTICIPANTS.get(name, "manager")
 
 
 @lru_cache(64)

@@ -4,12 +4,12 @@ import re
 
 from msgspec import Struct
 
-_CLAIM = re.compile(r"(?:.*[-.])?(?:up-starting-[0-9a-f]{8}|seat-[0-9a-f]{8}-.+)")
+_CLAIM = re.compile(r"(?:.*[-.])?seat-[0-9a-f]{8}-.+")
 """Name of a participant that is only shown to claim something; with keys, that of its holder stands before it."""
 
 
 def is_claim(participant: str) -> bool:
-    """True if a participant only claims something: the start of a robot, or a seat. It answers and does nothing."""
+    """True if a participant only claims something, which is a seat. It answers and does nothing."""
     return _CLAIM.fullmatch(participant) is not None
 
 

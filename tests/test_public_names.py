@@ -15,7 +15,7 @@ from engage_hri.services.commandline.shell.roster import ROBOT
 from tests.bus.places import free_endpoint
 
 SOURCE = Path(engage_hri.__file__).read_text(encoding="utf-8")
-STAND_INS = ("engage_hri.services.simulation", "engage_hri.services.collaboration", "engage_hri.services.tangram")
+STAND_INS = ("engage_hri.services.simulation", "engage_hri.services.tangram")
 """Services and data of what a robot does without: a simulated person and table, and the task."""
 
 

@@ -12,7 +12,11 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "configuration.md"
-SECTIONS = ("bus", "generation", "realizer", "recognition", "control", "simulation", "collaboration")
+SECTIONS = {
+    "bus": "bus", "generation": "generation", "realizer": "realizer", "recognition": "recognition",
+    "control": "control", "simulation": "tangram/people", "collaboration": "tangram/collaboration",
+}  # fmt: skip
+"""Folder of each section."""
 HEAD = """\
 # Configuration
 
@@ -20,7 +24,8 @@ One TOML file configures all services: `engage run SERVICE --config engage.toml`
 `up`, `play`, `plan` and `watch`. Each table below is a table of that file. Everything has a default; an unknown key,
 a wrong type or a value out of range is refused at start, with the file and the key. One setting can also be given
 on the command line, stronger than the file: `--set recognition.gaze_resolution=table`. What drives a robot loads
-nothing of the simulation: `engage run` of its services passes over `[simulation]` and `[collaboration]`.
+nothing of the tangram: all commands but `demo`, `up`, `simulate` and `run` of these two pass over `[simulation]` and
+`[collaboration]`.
 
 The environment has its say, too: `ENGAGE_CONFIG` names the file where no option does, and `ENGAGE_BUS_ROBOT`,
 `ENGAGE_BUS_MODE` and `ENGAGE_BUS_CONNECT` (endpoints, with commas between them) are stronger than the file and weaker
@@ -54,8 +59,8 @@ class Key(NamedTuple):
 
 def page() -> str:
     parts = [HEAD]
-    for section in SECTIONS:
-        module = ast.parse((ROOT / "services" / section / "config.py").read_text(encoding="utf-8"))
+    for section, folder in SECTIONS.items():
+        module = ast.parse((ROOT / "services" / folder / "config.py").read_text(encoding="utf-8"))
         classes = [node for node in module.body if isinstance(node, ast.ClassDef)]
         own = [node for node in classes if node.name.endswith("Config")]
         for node in [*own, *(node for node in classes if node not in own)]:

@@ -23,7 +23,9 @@ class Often:
     A flood of messages that nobody can read is so not answered with a flood of faults.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, calm: Seconds = CALM) -> None:
+        """calm: time without a refusal of a kind after which the next one counts as the first."""
+        self._calm = calm
         self._counts: dict[tuple[str, str], tuple[int, Seconds]] = {}
         """Number and time of the last refusal, the one longest ago first."""
         self._kinds: Counter[str] = Counter()
@@ -47,7 +49,7 @@ class Often:
     def _forget(self, now: Seconds) -> None:
         while self._counts:
             (sender, kind), (_, last) = next(iter(self._counts.items()))
-            if now - last < CALM:
+            if now - last < self._calm:
                 break
             del self._counts[sender, kind]
             self._kinds[sender] -= 1

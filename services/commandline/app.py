@@ -17,6 +17,7 @@ from typer.core import TyperGroup
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.commandline.shell import logs
 from engage_hri.services.commandline.shell.exit_codes import exit_code
+from engage_hri.services.runtime.installation import extra_command
 
 FAMILIES: dict[str, dict[str, str]] = {
     "look": {
@@ -36,18 +37,16 @@ FAMILIES: dict[str, dict[str, str]] = {
     },
     "talk": {
         "play": "Perform turn fragments and BML blocks. Exit 0 done, 2 input refused, 3 failed while running.",
-        "steer": "Hold what a running robot performs, let it continue, or stop it: a behavior, a block, or "
-        "everything. Exit 2 if it is not being performed.",
-        "plan": "Check a block and print its Petri net and predicted schedule. Nothing moves.",
+        "steer": "Hold what a running robot performs, let it continue, or stop it; begin a condition of a study. "
+        "Exit 2 if it is not being performed.",
+        "plan": "Check a block and print its Petri net and predicted schedule, or why its references are made so. "
+        "Nothing moves.",
         "bml": "Print the BML that a turn fragment becomes, or a block in another dialect. Nothing moves.",
-        "explain": "Tell why each object reference is made as it is: all gestures with all phrases. Nothing moves.",
         "tool": "Print the tool by which a language model speaks through the robot, for its API.",
     },
     "study": {
         "simulate": "Play many sessions in virtual time, and compare the conditions of the study. Exit 3 if one "
         "did not finish.",
-        "condition": "Begin a condition of a study on a running robot, or tell which one is in force. Exit 2 if "
-        "the name is too long.",
         "record": "Record all that a robot says on its bus into a file (MCAP), until Ctrl-C.",
         "replay": "Play a recording on a bus, at any speed, to and fro. Exit 75 if a live robot of its name is "
         "there.",
@@ -75,12 +74,23 @@ TITLES = {
 }
 """Headings of the folders in the list of all commands."""
 COMMANDS = {name: does for commands in FAMILIES.values() for name, does in commands.items()}
+TANGRAM = "engage_hri.services.tangram"
 _FOLDER = {name: folder for folder, commands in FAMILIES.items() for name in commands}
 
 
 def command(name: str) -> Any:
-    """Load a command from its file. Its own options come first, then the shared ones."""
-    module = import_module(f"engage_hri.services.commandline.{_FOLDER[name]}.{name.replace('-', '_')}")
+    """Load a command from its file. Its own options come first, then the shared ones.
+
+    Raises InputRefused if it needs the tangram, and that is not installed.
+    """
+    try:
+        module = import_module(f"engage_hri.services.commandline.{_FOLDER[name]}.{name.replace('-', '_')}")
+    except ModuleNotFoundError as error:
+        if not (error.name or "").startswith(TANGRAM):
+            raise
+        raise InputRefused(
+            Fault(reason="it needs the tangram", where=f"engage {name}", advice=extra_command("tangram"))
+        ) from error
     taken = inspect.signature(module.Options).parameters
     names = [option for kind in module.Options.__mro__ for option in inspect.get_annotations(kind)]
 

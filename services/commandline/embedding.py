@@ -7,17 +7,25 @@ async with embedded(human="listening") as robot:
 """
 
 from collections.abc import AsyncIterator, Iterable, Mapping
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING
 
+from engage_hri.schemas import keys
 from engage_hri.services.bus.interface import Hub
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import Robot
 from engage_hri.services.commandline.shell import roster
-from engage_hri.services.commandline.shell.config import Config, load
+from engage_hri.services.commandline.shell.recording_file import recording
+from engage_hri.services.commandline.shell.settings import RobotConfig
+from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.control.bases.driver_guard import GuardedBody
 from engage_hri.services.control.contract.body import Body
+from engage_hri.services.runtime.configuration import read
 from engage_hri.services.runtime.service import Service, running
-from engage_hri.services.simulation.config import HumanKind
+
+if TYPE_CHECKING:
+    from engage_hri.services.tangram.people.config import HumanKind
 
 
 class EmbeddedRobot(Robot):
@@ -28,7 +36,7 @@ class EmbeddedRobot(Robot):
 
 @asynccontextmanager
 async def embedded(
-    *, human: HumanKind = "attentive", body: Body | None = None, settings: Iterable[str] = ()
+    *, human: "HumanKind" = "attentive", body: Body | None = None, settings: Iterable[str] = ()
 ) -> AsyncIterator[EmbeddedRobot]:
     """Run a robot and what is around it in this process, until the end of `async with`. Nobody else sees its bus.
 
@@ -40,10 +48,10 @@ async def embedded(
     settings: `key=value` of docs/configuration.md, as `engage up --set` takes them; they are stronger than `human`.
 
     Raises:
-        InputRefused: there is no such setting or body.
+        InputRefused: there is no such setting or body, or the tangram is not installed.
         RunFailed: the body cannot be had.
     """
-    config = load(settings=settings, defaults=(f"simulation.human={human}",))
+    config = read(roster.complete(), settings=settings, defaults=(f"simulation.human={human}",))
     async with in_memory(config, services(config, *roster.ROBOT, "simulation", body=body)) as hub:
         bus = hub.join("program")
         try:
@@ -55,7 +63,7 @@ async def embedded(
             await bus.leave()
 
 
-def services(config: Config, *names: str, body: Body | None = None) -> dict[str, Service]:
+def services(config: RobotConfig, *names: str, body: Body | None = None) -> dict[str, Service]:
     """Bind these services to the configuration. body: that of control instead of the configured one.
 
     Raises InputRefused.
@@ -65,7 +73,7 @@ def services(config: Config, *names: str, body: Body | None = None) -> dict[str,
 
 
 @asynccontextmanager
-async def in_memory(config: Config, services: Mapping[str, Service]) -> AsyncIterator[Hub]:
+async def in_memory(config: RobotConfig, services: Mapping[str, Service]) -> AsyncIterator[Hub]:
     """Run services in this process on a bus of their own, until the end of `async with`.
 
     An error in there is raised as it is, and so is that of a service which ends all; of several: an ExceptionGroup.
@@ -77,3 +85,17 @@ async def in_memory(config: Config, services: Mapping[str, Service]) -> AsyncIte
         if len(group.exceptions) > 1:
             raise
         raise group.exceptions[0] from None
+
+
+async def play_tangram(
+    config: RobotConfig, sinks: Iterable[Sink], hub: Hub | None = None, record: Path | None = None
+) -> None:
+    """Run all services until the task is over. sinks: get all messages, with instants of this loop.
+
+    hub: the bus on which they run, for others to look on; None: one in memory. record: a file for all that is said.
+    """
+    async with MemoryHub(config.robot, decodes=False) if hub is None else nullcontext(hub) as hub:
+        bound = services(config, *roster.NAMES)
+        kept = recording(hub.join("record"), record, (keys.EVERYTHING,), {}) if record else nullcontext()
+        async with kept, following(hub.join("console"), sinks), running(hub, bound) as over:
+            await over.wait()

@@ -31,11 +31,12 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.vocabulary import normal
-from engage_hri.services.console.nearest import is_unnamed, performed
 
 ACTIONS = ("NOD", "SHAKE")
 """Movements of the head of which actions tell."""
 
+LACKS, NEAR = "this body has no", ", as near as it can"
+"""Words of a warning of the body that performs something near, which it names itself, and those for the deed."""
 HANDS: Mapping[Hand, str] = {
     "LEFT_HAND": " with the left hand", "RIGHT_HAND": " with the right hand", "BOTH_HANDS": " with both hands",
 }  # fmt: skip
@@ -46,18 +47,10 @@ class Deed(NamedTuple):
 
     sync: str
     words: str
-    behavior: Behavior
 
     def as_warned(self, warning: str) -> "Deed":
-        """Tell what the body does, which may be only near what was asked. warning: of kind DEGRADED, of the behavior.
-
-        If the words do not name what is done instead, the deed is only near.
-        """
-        behavior = performed(self.behavior, warning)
-        words = _words(behavior)
-        if words and is_unnamed(warning):
-            words = f"{words}, as near as it can"
-        return Deed(self.sync, words, behavior)
+        """Tell that the body does only something near to it. warning: of kind DEGRADED, which says what it lacks."""
+        return self._replace(words=f"{self.words}{NEAR}") if LACKS in warning else self
 
 
 def deeds(thing: Block | TurnFragment) -> dict[tuple[str, str], Deed]:
@@ -70,7 +63,7 @@ def deeds(thing: Block | TurnFragment) -> dict[tuple[str, str], Deed]:
             row = TYPES[type]
             seen = "stroke_start" if row.has_stroke else "stroke" if "stroke" in row.points else row.points[-1]
             sync = dialect_sync(same_instant(seen, type), type, dialect)
-            found[thing.id, behavior.id] = Deed(sync or seen, words, behavior)
+            found[thing.id, behavior.id] = Deed(sync or seen, words)
     return found
 
 

@@ -1,7 +1,7 @@
 """Configuration of control: how it reports, zones that are never pointed into, and faults of the simulated body."""
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 from msgspec import Struct
 
@@ -111,9 +111,6 @@ class ControlConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     body: str | tuple[str, ...] = "simulated"
     voice: str = ""
     drivers: Mapping[str, Mapping[str, Any]] = {}
-
-    FIXED: ClassVar[Mapping[str, Any]] = {"dead_man": 5.0}
-    """Former keys, and the value of the constant that has taken the place of each."""
 
     @property
     def bodies(self) -> tuple[str, ...]:

@@ -1,8 +1,7 @@
 """Every parameter of engagement generation: unit, default, source. Refused at start when it contradicts itself."""
 
-from collections.abc import Mapping
 from math import pi
-from typing import Any, ClassVar, Literal
+from typing import Literal
 
 from msgspec import Struct
 
@@ -61,15 +60,6 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """Seconds after a block's end for which undecided connection events may delay the fragment's outcome. Ours."""
     glance_factor: float = 1.0
     """Factor k: a glance is due after k times the mean time between connection events. Thesis 3.3.4 has 1."""
-
-    FIXED: ClassVar[Mapping[str, Any]] = {
-        "expected_delay": 0.3, "words_between": 3.0, "figure_lead": 2.0, "this_within": 0.65, "low_end": True,
-        "phrase_attributes": ("color", "shape", "feature", "size"), "turn_silence": 10.0, "words_patience": 2.0,
-        "longest_answer": 15.0, "world_patience": 5.0, "body_patience": 5.0, "fragments": 200, "dwell": 0.3,
-        "retry": 1.0, "mtbce_prior": 5.7, "mtbce_low": 3.0, "mtbce_high": 15.0, "mtbce_events": 5,
-        "glance_duration": 0.9, "response_hold": 0.8, "hand_speed": 0.05, "hand_onset": 0.2, "hand_stillness": 0.8,
-    }  # fmt: skip
-    """Former keys, and the value of the constant that has taken the place of each."""
 
     def __post_init__(self) -> None:
         gaze, directed, pointing = (

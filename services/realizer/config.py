@@ -1,8 +1,5 @@
 """Time limits and sizes of the realizer."""
 
-from collections.abc import Mapping
-from typing import Any, ClassVar
-
 from msgspec import Struct
 
 from engage_hri.schemas.ranges import not_negative
@@ -29,12 +26,6 @@ class RealizerConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     within 50 ms in 99 of 100 cases on two cores, if they begin at once, too (benchmarks/live_blocks.py)."""
     longest_hold: Seconds = 60.0
     """What is held for longer is stopped, so that no arm stays in the air when whoever held it has gone."""
-
-    FIXED: ClassVar[Mapping[str, Any]] = {
-        "late": 0.5, "late_factor": 1.0, "stall_factor": 5.0, "lead": 0.3, "gap": 0.05, "skew": 0.1,
-        "estimate": 2.0, "abort": 5.0, "pulse": 1.0, "lease": 4.0, "most": 2000,
-    }  # fmt: skip
-    """Former keys, and the value of the constant that has taken the place of each."""
 
     def __post_init__(self) -> None:
         not_negative(self, self.__struct_fields__)

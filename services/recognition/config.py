@@ -1,7 +1,6 @@
 """Settings of recognition: time limits, resolution, windows. Defaults: design page and Table 2.1."""
 
-from collections.abc import Mapping
-from typing import Any, ClassVar, Literal
+from typing import Literal
 
 from msgspec import Struct
 
@@ -24,13 +23,6 @@ class Sensing(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     gaze_half_angle: Degrees = 5.0
     """Half angle of the gaze cone: what is farther off the head's direction is not looked at. Right for eye trackers;
     where only the nose is seen take 10, and `gaze_resolution` `table`."""
-
-    FIXED: ClassVar[Mapping[str, Any]] = {
-        "gaze_margin": 1.0, "dwell": 0.15, "face_radius": 0.12, "robot_face": (0.05, 0.0, 1.17), "memory": 10.0,
-        "voice_onset": 0.1, "voice_pause": 0.25, "voice_lost": 0.5, "hand_reach": 0.1, "moved": 0.025,
-        "tremor": 0.01, "smoothing": 0.15, "rest": 0.3, "oldest": 0.5, "settling": 0.35,
-    }  # fmt: skip
-    """Former keys, and the value of the constant that has taken the place of each."""
 
     def __post_init__(self) -> None:
         positive(self, ("gaze_half_angle",), "sensing.")
@@ -68,14 +60,6 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Estimate from which a person is engaged: for example all events good, but half as fast as usual. Ours."""
     disengaged_below: Probability = 0.25
     """Estimate below which a person is disengaged; between the two, weakening. Ours."""
-
-    FIXED: ClassVar[Mapping[str, Any]] = {
-        "accept": ("speak", "nod", "shake", "point"), "turn_patience": 12.0, "direct_by_look": 0.6,
-        "after_robot_directed": 2.0, "words_margin": 0.5, "words_patience": 10.0, "look_break": 0.15,
-        "longest_speech": 60.0, "longest_gesture": 10.0, "longest_manipulation": 120.0, "enough_events": 5,
-        "hysteresis": 0.05,
-    }  # fmt: skip
-    """Former keys, and the value of the constant that has taken the place of each."""
 
     def __post_init__(self) -> None:
         positive(self, (

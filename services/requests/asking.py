@@ -3,10 +3,6 @@
 What becomes of one request is `TABLE` in asking_table.py. `Asking` keeps any number of requests and their
 deadlines, and follows the table.
 
-A server has a limited number of them before it without an answer (`SendWindow`). Who asks for ten thousand things at
-once would else fill the links and the queue of the server, which are the others' too, and would send again what only
-has not come yet.
-
     effects = asking.send(keys.BLOCK, request, now)
     effects = asking.hear(answer, now)                 # and server_gone, server_there, cancel
     effects = asking.tick(now)                         # whenever `asking.deadline` has come
@@ -44,27 +40,105 @@ from engage_hri.schemas.requests import (
 )
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.sight import Sight
-from engage_hri.services.requests.asking_table import (
-    TABLE,
-    AskingAction,
-    AskingEvent,
-    AskingFault,
-    AskingState,
-    Effect,
-    PublishCommand,
-    Renew,
-    SentRequest,
-    Server,
-    TellAccepted,
-    TellEnd,
-)
+from engage_hri.services.requests.asking_table import TABLE, AskingAction, AskingEvent, AskingState
 from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.requests.serving_table import ANEW, unwieldy
 from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
 
 
+class PublishCommand(Struct, frozen=True):
+    """Publish this message. expression: the key expression of the command, as in `schemas/keys.py`."""
+
+    expression: str
+    message: Request
+
+
+class Renew(Struct, frozen=True):
+    """Send `server` a `KeepAlive` for these requests."""
+
+    server: str
+    live: tuple[Kept, ...]
+
+
+class TellAccepted(Struct, frozen=True):
+    """Tell the caller that the server has accepted the request."""
+
+    id: str
+    answer: Accepted
+
+
+class TellEnd(Struct, frozen=True):
+    """Tell the caller how the request has ended. There is exactly one for each request."""
+
+    id: str
+    end: Outcome | EngageError
+
+
+class AskingFault(Struct, frozen=True):
+    """Publish this fault for all to see."""
+
+    fault: Fault
+
+
+Effect = PublishCommand | Renew | TellAccepted | TellEnd | AskingFault
+
+
+class Patience(Struct, frozen=True, kw_only=True):
+    """Limits of a requester, times in seconds.
+
+    first_resend: until a request that nobody has answered is sent again; the wait doubles up to longest_resend.
+    grace: how long the server may be gone before its requests fail: a restart of the router looks like a death. By
+    then it has ended them, if it lives: it misses us a silent link's lease later than we miss it, and has its grace.
+    pulse: between two `KeepAlive`. lease: how long a request that is not renewed stays alive at its server.
+    cancel: how long after its cancellation a request may take to end. silence: how long a server that is there may
+    leave a request without any answer. swallow: how long late answers to a request that was given up are ignored.
+    window: number of requests that a server may have before it without an answer; more wait here.
+    """
+
+    first_resend: Seconds = 0.3
+    longest_resend: Seconds = 2.0
+    grace: Seconds = 4.0
+    pulse: Seconds = 1.0
+    lease: Seconds = 5.0
+    cancel: Seconds = 30.0
+    silence: Seconds = 30.0
+    swallow: Seconds = 60.0
+    window: int = 64
+
+
+class SentRequest:
+    """One request. run: the life of the server that accepted it. sent_at: when it was sent last; None: never."""
+
+    def __init__(self, expression: str, request: Request) -> None:
+        self.expression = expression
+        self.server = keys.server_of(expression)
+        self.kind = kind_of(request)
+        self.request = request
+        self.cancel: Cancel | None = None
+        self.state = AskingState.SENT
+        self.run = ""
+        self.sent_at: Seconds | None = None
+        self.resend_after: Seconds = 0.0
+
+
+class Server:
+    """The requests that one server is asked to keep alive.
+
+    period: seconds between two `KeepAlive`. soon: seconds until the one after the next.
+    """
+
+    def __init__(self, period: Seconds) -> None:
+        self.kept: dict[str, SentRequest] = {}
+        self.period = period
+        self.soon = period
+
+
 class SendWindow:
-    """Requests to one server that are on their way without an answer; those that wait for that, in their order."""
+    """Requests to one server that are on their way without an answer; those that wait for that, in their order.
+
+    Who asks for ten thousand things at once would else fill the links and the queue of the server, which are the
+    others' too, and would send again what only has not come yet.
+    """
 
     def __init__(self, size: int) -> None:
         """size: number of requests that may be on their way."""
@@ -92,29 +166,6 @@ class SendWindow:
             return None
         self._on_their_way.discard(id)
         return next(iter(self._waiting), None)
-
-
-class Patience(Struct, frozen=True, kw_only=True):
-    """Limits of a requester, times in seconds.
-
-    first_resend: until a request that nobody has answered is sent again; the wait doubles up to longest_resend.
-    grace: how long the server may be gone before its requests fail: a restart of the router looks like a death. By
-    then it has ended them, if it lives: it misses us a silent link's lease later than we miss it, and has its grace.
-    pulse: between two `KeepAlive`. lease: how long a request that is not renewed stays alive at its server.
-    cancel: how long after its cancellation a request may take to end. silence: how long a server that is there may
-    leave a request without any answer. swallow: how long late answers to a request that was given up are ignored.
-    window: number of requests that a server may have before it without an answer; more wait here.
-    """
-
-    first_resend: Seconds = 0.3
-    longest_resend: Seconds = 2.0
-    grace: Seconds = 4.0
-    pulse: Seconds = 1.0
-    lease: Seconds = 5.0
-    cancel: Seconds = 30.0
-    silence: Seconds = 30.0
-    swallow: Seconds = 60.0
-    window: int = 64
 
 
 _Said = Answer | None

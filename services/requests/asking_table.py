@@ -15,20 +15,11 @@ Zenoh delivers a message, or loses it with a link, and tells neither side. So fo
 Decision 0010 says how a request is known, 0087 why "unknown" is an answer of its own. Nothing that a caller, a
 server, the bus or the clock does at any moment is undefined: `asking.py` follows this table, and a model in the
 tests plays both tables against each other with losses and deaths.
-
-Below the table stand what is kept of one request, and the effects that `asking.py` asks for.
 """
 
 from collections.abc import Mapping
 from enum import Enum, auto
 from typing import TypeVar
-
-from msgspec import Struct
-
-from engage_hri.schemas import keys
-from engage_hri.schemas.faults import EngageError, Fault
-from engage_hri.schemas.requests import Accepted, Cancel, Kept, Outcome, Request, kind_of
-from engage_hri.schemas.units import Seconds
 
 
 class TableMember(Enum):
@@ -208,67 +199,3 @@ TABLE: Mapping[AskingState, Mapping[AskingEvent, Row]] = {
     }, E.ASKED, E.CANCELLED, E.HEARD, E.ACCEPTED, E.OUTDATED, E.GRACE_OVER, E.PATIENCE_OVER),
     S.ENDED: rows(S.ENDED, {}, *AskingEvent),
 }  # fmt: skip
-
-
-class SentRequest:
-    """One request. run: the life of the server that accepted it. sent_at: when it was sent last; None: never."""
-
-    def __init__(self, expression: str, request: Request) -> None:
-        self.expression = expression
-        self.server = keys.server_of(expression)
-        self.kind = kind_of(request)
-        self.request = request
-        self.cancel: Cancel | None = None
-        self.state = AskingState.SENT
-        self.run = ""
-        self.sent_at: Seconds | None = None
-        self.resend_after: Seconds = 0.0
-
-
-class Server:
-    """The requests that one server is asked to keep alive.
-
-    period: seconds between two `KeepAlive`. soon: seconds until the one after the next.
-    """
-
-    def __init__(self, period: Seconds) -> None:
-        self.kept: dict[str, SentRequest] = {}
-        self.period = period
-        self.soon = period
-
-
-class PublishCommand(Struct, frozen=True):
-    """Publish this message. expression: the key expression of the command, as in `schemas/keys.py`."""
-
-    expression: str
-    message: Request
-
-
-class Renew(Struct, frozen=True):
-    """Send `server` a `KeepAlive` for these requests."""
-
-    server: str
-    live: tuple[Kept, ...]
-
-
-class TellAccepted(Struct, frozen=True):
-    """Tell the caller that the server has accepted the request."""
-
-    id: str
-    answer: Accepted
-
-
-class TellEnd(Struct, frozen=True):
-    """Tell the caller how the request has ended. There is exactly one for each request."""
-
-    id: str
-    end: Outcome | EngageError
-
-
-class AskingFault(Struct, frozen=True):
-    """Publish this fault for all to see."""
-
-    fault: Fault
-
-
-Effect = PublishCommand | Renew | TellAccepted | TellEnd | AskingFault

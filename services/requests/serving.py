@@ -37,42 +37,16 @@ from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.requests.serving_table import (
     ANEW,
     TABLE,
-    Effect,
-    Hand,
-    HoldRequest,
     Key,
-    PublishAnswer,
     Record,
     ServingAction,
     ServingEvent,
-    ServingFault,
     ServingState,
     content_of,
     event_of,
     key_of,
 )
 from engage_hri.services.runtime.absent import Absent
-
-KEPT = 4096
-
-
-class Names:
-    """Names that were not given lately: the id itself, then `ask~2`, `ask~3`. kept: ids that are remembered."""
-
-    def __init__(self, kept: int = KEPT) -> None:
-        self._kept = kept
-        self._used: OrderedDict[str, int] = OrderedDict()
-
-    def unique(self, id: str) -> str:
-        """A name for `id` that no other has."""
-        while (count := self._used.pop(id, 0) + 1) > 1:
-            self._used[id] = count
-            id = f"{id}~{count}"
-        self._used[id] = count
-        while len(self._used) > self._kept:
-            self._used.popitem(last=False)
-        return id
-
 
 MOST = 8 * 1024 * 1024
 """Bytes of the requests that are remembered, of all senders together."""
@@ -143,6 +117,65 @@ class EndedRequests:
         self.bytes -= size
         if not self._of[sender]:
             del self._of[sender], self._bytes[sender]
+
+
+class PublishAnswer(Struct, frozen=True):
+    """Publish this answer. again: it has been given before."""
+
+    answer: Answer
+    again: bool = False
+
+
+class Hand(Struct, frozen=True):
+    """Give this to the service: a request, new or changed, or a `Cancel`. Its `id` is its name at this server.
+
+    is_asked: the message itself has just come; otherwise it was made here, as after a lease is over.
+    """
+
+    request: Request
+    is_asked: bool
+
+
+class HoldRequest(Struct, frozen=True, tag="hold_request"):
+    """Tell the service to hold the request of this name, since nobody renews it, or to go on with it.
+
+    until: when it ends unless it is renewed; None: it goes on. why: what has happened, and whose it was.
+    """
+
+    name: str
+    until: Seconds | None
+    why: Fault | None = None
+
+
+class ServingFault(Struct, frozen=True):
+    """Publish this fault for all to see. is_ours: it is a mistake of the service itself."""
+
+    fault: Fault
+    is_ours: bool
+
+
+Effect = PublishAnswer | Hand | HoldRequest | ServingFault
+
+
+KEPT = 4096
+
+
+class Names:
+    """Names that were not given lately: the id itself, then `ask~2`, `ask~3`. kept: ids that are remembered."""
+
+    def __init__(self, kept: int = KEPT) -> None:
+        self._kept = kept
+        self._used: OrderedDict[str, int] = OrderedDict()
+
+    def unique(self, id: str) -> str:
+        """A name for `id` that no other has."""
+        while (count := self._used.pop(id, 0) + 1) > 1:
+            self._used[id] = count
+            id = f"{id}~{count}"
+        self._used[id] = count
+        while len(self._used) > self._kept:
+            self._used.popitem(last=False)
+        return id
 
 
 GRACE: Seconds = 2.0

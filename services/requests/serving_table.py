@@ -13,15 +13,13 @@ The counterpart of `asking_table.py`, which tells the theory. Three rules follow
 Nothing that a requester, the service itself, the bus or the clock does at any moment is undefined. `serving.py`
 follows this table.
 
-Below the table stand the effects that `serving.py` asks for, and what is kept of one request (`Record`): it tells
-which event a command is that comes.
+Below the table stands what is kept of one request (`Record`): it tells which event a command is that comes.
 """
 
 from collections.abc import Mapping
 from enum import auto
 from math import inf
 
-from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.faults import Fault
@@ -179,44 +177,6 @@ TABLE: Mapping[ServingState, Mapping[ServingEvent, Row]] = {
         E.END: (S.ENDED, ServingAction.WARN_ENDED),
     }, E.HEAR, E.GONE, E.BACK, E.REBORN, E.GRACE_OVER, E.UNHEARD, E.LEASE_OVER),
 }  # fmt: skip
-
-
-class PublishAnswer(Struct, frozen=True):
-    """Publish this answer. again: it has been given before."""
-
-    answer: Answer
-    again: bool = False
-
-
-class Hand(Struct, frozen=True):
-    """Give this to the service: a request, new or changed, or a `Cancel`. Its `id` is its name at this server.
-
-    is_asked: the message itself has just come; otherwise it was made here, as after a lease is over.
-    """
-
-    request: Request
-    is_asked: bool
-
-
-class HoldRequest(Struct, frozen=True, tag="hold_request"):
-    """Tell the service to hold the request of this name, since nobody renews it, or to go on with it.
-
-    until: when it ends unless it is renewed; None: it goes on. why: what has happened, and whose it was.
-    """
-
-    name: str
-    until: Seconds | None
-    why: Fault | None = None
-
-
-class ServingFault(Struct, frozen=True):
-    """Publish this fault for all to see. is_ours: it is a mistake of the service itself."""
-
-    fault: Fault
-    is_ours: bool
-
-
-Effect = PublishAnswer | Hand | HoldRequest | ServingFault
 
 
 ANEW = "if it is to be done again, send it under a new id"

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import msgspec
 from msgspec import Struct
 
-from engage_hri.schemas.explained import explained, without_former
+from engage_hri.schemas.explained import explained
 from engage_hri.schemas.faults import Fault, InputRefused, NotReady
 from engage_hri.schemas.utf8 import is_utf8, utf8
 from engage_hri.services.bus.config import BusConfig, environment
@@ -51,7 +51,7 @@ def read(
     if key := _not_a_number(merged):
         raise InputRefused(Fault(reason=f"nan is not a number, in `{key}`", where=where, advice=_ADVICE))
     try:
-        return msgspec.convert(without_former(merged, kind), kind)
+        return msgspec.convert(merged, kind)
     except msgspec.ValidationError as error:
         raise InputRefused(Fault(reason=_explained(error, kind), where=where, advice=_ADVICE)) from error
 

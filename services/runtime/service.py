@@ -57,13 +57,13 @@ async def serve(hub: Hub, name: str, service: Service, ready: Ready = lambda: No
 
     bus.answer(keys.status(name), status, empty=AskStatus())
     try:
-        await _while_alone(bus, service(bus, stands))
+        await while_alone(bus, service(bus, stands))
     finally:
         await bus.leave()
 
 
-async def _while_alone(bus: Bus, work: Coroutine[Any, Any, None]) -> None:
-    """Serve until the work ends, or another service of this name has precedence. Raises InputRefused then.
+async def while_alone(bus: Bus, work: Coroutine[Any, Any, None]) -> None:
+    """Wait for the end of the work, or until another participant of this name has precedence: then raise NotReady.
 
     One that starts while another is there is refused before it begins. So two of one name have started at once, or
     without seeing one another, as behind a cut. Neither knows who was first; the one of the lesser run stays.

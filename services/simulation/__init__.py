@@ -1,1 +1,1 @@
-"""Simulation of a person at the tangram table, as the anchor study saw people, and of cameras and a microphone."""
+"""A world in which nothing moves, and somebody in it who may attend to the robot: for trying things out."""

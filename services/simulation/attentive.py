@@ -1,6 +1,6 @@
 """An attentive person: looks where the robot looks and points, meets its eyes, and answers with a nod or a yes.
 
-Pure. This person is for first meetings: the only task it knows is to place tangram pieces; the rest needs no table.
+Pure. This person is for first meetings: it knows no task but that of which it is told.
 """
 
 from collections.abc import Callable
@@ -9,14 +9,16 @@ from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.simulation.hearing import THINKING, HeardSpeech
-from engage_hri.services.simulation.human import FACE, Act, LookAt, Pause, Start, Stop
+from engage_hri.services.simulation.human import FACE, Act, Lay, LookAt, Pause, Start, Stop
 from engage_hri.services.simulation.listening import ListeningHuman
 from engage_hri.services.simulation.speaking import speech
-from engage_hri.services.tangram.table import TangramTable
 
 
 class AttentiveHuman(ListeningHuman):
-    """The attentive person. person: its id. sees: ids it can look at. Delays: the means of Table 2.1."""
+    """The attentive person. person: its id. sees: ids it can look at. asked: see `ListeningHuman`.
+
+    Delays: the means of Table 2.1.
+    """
 
     ANSWERS: Seconds = 0.4
     FOLLOWS: Seconds = 0.3
@@ -30,9 +32,9 @@ class AttentiveHuman(ListeningHuman):
         sees: frozenset[str],
         robot: str = "robot",
         vary: Callable[[], Seconds] = lambda: 0.0,
-        table: TangramTable | None = None,
+        asked: Callable[[HeardSpeech], Lay | None] = lambda utterance: None,
     ) -> None:
-        super().__init__(table, robot, vary)
+        super().__init__(asked, robot, vary)
         self._person = person
         self._sees = sees
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.simulation.hearing import HeardSpeech, Hearing, requested_placement
+from engage_hri.services.simulation.hearing import HeardSpeech, Hearing
 from engage_hri.services.simulation.human import (
     FACE,
     TABLE,
@@ -22,7 +22,6 @@ from engage_hri.services.simulation.human import (
     Sit,
     Withdraw,
 )
-from engage_hri.services.tangram.table import TangramTable
 
 COMES: tuple[Act, ...] = (LookAt(TABLE), Pause(0.8), Sit(), Pause(0.8), LookAt(FACE))
 GOES: tuple[Act, ...] = (LookAt(TABLE), Pause(1.0), LookAt(FACE), Pause(1.0), Leave())
@@ -36,7 +35,7 @@ def moves(lay: Lay) -> tuple[Act, ...]:
 class ListeningHuman(Human):
     """The listening person: looks where the robot points, at its face in between, and leaves after "goodbye".
 
-    Each request is answered by a placement. table: with the pieces to move; None: none.
+    asked: finds the placement for which an utterance asks, which is then the answer; None: it asks for none.
     """
 
     ANSWERS: Seconds = 0.5
@@ -47,10 +46,13 @@ class ListeningHuman(Human):
     """Answer to words that ask for nothing."""
 
     def __init__(
-        self, table: TangramTable | None, robot: str = "robot", vary: Callable[[], Seconds] = lambda: 0.0
+        self,
+        asked: Callable[[HeardSpeech], Lay | None],
+        robot: str = "robot",
+        vary: Callable[[], Seconds] = lambda: 0.0,
     ) -> None:
         super().__init__((), robot, vary)
-        self._table = table
+        self._asked = asked
         self._hearing = Hearing(robot)
 
     def enter(self, now: Seconds) -> None:
@@ -74,5 +76,5 @@ class ListeningHuman(Human):
         """Acts that answer the words of a whole block."""
         if "goodbye" in utterance.words:
             return GOES
-        lay = None if self._table is None else requested_placement(utterance, self._table)
+        lay = self._asked(utterance)
         return self.ACKNOWLEDGES if lay is None else (*moves(lay), Pause(0.2), LookAt(FACE))

@@ -1,6 +1,7 @@
-"""A world in which nothing moves: from a file, or the tangram table. Its people sit there, and one may attend."""
+"""A world in which nothing moves, as from a file. Its people sit there, and one may attend."""
 
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Literal
 
@@ -24,8 +25,6 @@ from engage_hri.services.simulation.attentive import AttentiveHuman
 from engage_hri.services.simulation.hearing import Ears
 from engage_hri.services.simulation.human import FACE, Act, Human, LookAt, Pause, Start, Stop
 from engage_hri.services.simulation.speaking import SpokenWords
-from engage_hri.services.simulation.table import Table
-from engage_hri.services.tangram.table import tangram_table
 
 EXAMPLE = '{"entities": [{"id": "cup", "kind": "object", "position": [0.5, 0.1, 0.8], "category": "cup"}]}'
 ADVICE = f"for example {EXAMPLE}; places are in metres, at most {FARTHEST:.0e}"
@@ -102,11 +101,10 @@ class Bystander:
                 yield from self._actions.ends(action, (target,) if target else (), at)
 
 
-def tangram_world() -> World:
-    """The tangram table as it is at the start, with the person sitting at it."""
-    table = Table(tangram_table())
-    table.seated = True
-    return World(entities=table.entities(0.0))
+@cache
+def table_world() -> World:
+    """The world where no other is given: a table with ten pieces, and a person who sits at it."""
+    return load_world(Path(__file__).with_name("table.json"))
 
 
 def load_world(path: Path) -> World:

@@ -1,1 +1,1 @@
-"""The tangram table of the anchor study: its pieces and where they lie."""
+"""The tangram of the anchor study, an example of a task: its table, the simulated people at it, and its manager."""

@@ -19,7 +19,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.messages import Message, decode
-from engage_hri.services.commandline.robot.certificates import initialize
+from engage_hri.services.bus.certificates import initialize
 from tests.bus.places import OWN_ADDRESS, PATIENCE, free_endpoint
 
 PEM = serialization.Encoding.PEM

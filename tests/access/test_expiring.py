@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from engage_hri.services.commandline.robot.certificates import initialize
+from engage_hri.services.bus.certificates import initialize
 from tests.access.fortress import Told
 from tests.bus.places import OWN_ADDRESS, free_endpoint
 

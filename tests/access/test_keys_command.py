@@ -14,12 +14,12 @@ from cryptography.hazmat.primitives.asymmetric import ec
 
 from engage_hri.schemas.access import PARTICIPANTS
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.services.bus.certificates import STANDARD
 from engage_hri.services.bus.config import BusConfig
 from engage_hri.services.bus.keyring import read_keys
 from engage_hri.services.bus.zenoh.session import open_router
-from engage_hri.services.commandline.robot.certificates import STANDARD
-from engage_hri.services.commandline.robot.examine import _certificates
 from engage_hri.services.commandline.shell.process import UNREADY
+from engage_hri.services.doctor.service import _certificates
 from tests.cli.command import Engage
 from tests.cli.command import engage as made
 from tests.random_cases import share_of

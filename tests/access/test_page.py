@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 from engage_hri.schemas import access
-from engage_hri.services.commandline.robot.certificates import STANDARD
+from engage_hri.services.bus.certificates import STANDARD
 
 PAGE = (Path(__file__).parents[2] / "docs" / "security.md").read_text(encoding="utf-8")
 

@@ -19,8 +19,8 @@ from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.console.follow import following
 from engage_hri.services.runtime.service import Ready, running
-from engage_hri.services.simulation.config import SimulationConfig
-from engage_hri.services.simulation.still import show_world, tangram_world
+from engage_hri.services.simulation.still import show_world, table_world
+from engage_hri.services.tangram.people.config import SimulationConfig
 from tests.access.spy import Flow, SpyHub
 
 ROLES = {
@@ -56,7 +56,7 @@ async def visit(flows: set[Flow]) -> None:
     """All that the public client can do, in a world that stands still, and an operator who steers."""
     config = Config()
     services = {name: roster.service(name, config) for name in keys.SERVICES}
-    perception = partial(show_world, world=tangram_world(), is_attentive=True)
+    perception = partial(show_world, world=table_world(), is_attentive=True)
     async with SpyHub(flows, ROLES) as hub, running(hub, {"simulation": perception, **services}):
         viewer = hub.join("viewer")
         nets = following(viewer, [lambda message, at: None], patterns=(keys.NET,))

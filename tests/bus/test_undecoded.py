@@ -16,13 +16,13 @@ from engage_hri.schemas.messages import Message, published
 from engage_hri.schemas.status import AskStatus
 from engage_hri.services.bus.interface import Received, Sample
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.robot import connect
+from engage_hri.services.client.connection import connect
 from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.commandline.shell.roster import service
 from engage_hri.services.commandline.shell.sources import still
 from engage_hri.services.runtime.service import running
 from engage_hri.services.runtime.virtual_time import run_virtual
-from engage_hri.services.simulation.still import tangram_world
+from engage_hri.services.simulation.still import table_world
 
 PLAIN = (str, int, float, bool, bytes, type(None))
 
@@ -85,7 +85,7 @@ async def performed(*, decodes: bool) -> list[tuple[str, str, bytes]]:
         ),
     )
     turn = TurnFragment(id="f", addressee="human", behaviors=(Speech(id="s", text="and now you"),))
-    async with Recording(decodes=decodes) as hub, running(hub, {"simulation": still(tangram_world()), **services}):
+    async with Recording(decodes=decodes) as hub, running(hub, {"simulation": still(table_world()), **services}):
         async with connect(hub=hub, name="manager") as robot:
             await robot.realize(block)
             await robot.perform(turn)

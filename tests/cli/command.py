@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import pytest
 
+from engage_hri.services.bus.certificates import initialize
 from engage_hri.services.commandline.app import main
-from engage_hri.services.commandline.robot.certificates import initialize
 from engage_hri.services.commandline.shell import logs
 from tests.bus.places import OWN_ADDRESS, free_endpoint
 

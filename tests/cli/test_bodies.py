@@ -8,7 +8,7 @@ import pytest
 
 from engage_hri.schemas.behaviors import Gaze, Speech
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.services.client.robot import connect
+from engage_hri.services.client.connection import connect
 from tests.bus.places import free_endpoint
 from tests.cli.command import Engage, start
 from tests.control.test_docs import CODE
@@ -98,20 +98,22 @@ def test_without_a_voice_the_turn_has_failed_and_is_told_what_to_do(
     assert "--voice silent" in result.err
 
 
-@pytest.mark.parametrize("command", ["plan", "explain"])
+@pytest.mark.parametrize("command", [("plan",), ("plan", "--why")])
 def test_it_is_asked_for_estimates_without_a_connection(
-    engage: Engage, tmp_path: Path, robot: str, command: str
+    engage: Engage, tmp_path: Path, robot: str, command: tuple[str, ...]
 ) -> None:
-    result = engage(command, tmp_path / "ask.xml", "--body", robot, "--voice", "silent")
+    result = engage(*command, tmp_path / "ask.xml", "--body", robot, "--voice", "silent")
 
     assert result.code == 0, result.err
     assert "AssertionError" not in result.err
 
 
-@pytest.mark.parametrize("command", ["plan", "explain"])
-def test_a_wrong_body_is_not_the_fault_of_the_file(engage: Engage, tmp_path: Path, robot: str, command: str) -> None:
-    body = engage(command, tmp_path / "ask.xml", "--body", "nosuch")
-    voice = engage(command, tmp_path / "ask.xml", "--voice", "nosuch")
+@pytest.mark.parametrize("command", [("plan",), ("plan", "--why")])
+def test_a_wrong_body_is_not_the_fault_of_the_file(
+    engage: Engage, tmp_path: Path, robot: str, command: tuple[str, ...]
+) -> None:
+    body = engage(*command, tmp_path / "ask.xml", "--body", "nosuch")
+    voice = engage(*command, tmp_path / "ask.xml", "--voice", "nosuch")
 
     assert (body.code, voice.code) == (2, 2)
     assert body.err.startswith("body nosuch: no body 'nosuch' (known are ")

@@ -28,7 +28,7 @@ SCENE = """\
 def chosen(engage: Engage, tmp_path: Path, *more: str) -> tuple[str, str]:
     path = tmp_path / "scene.xml"
     path.write_text(SCENE)
-    result = engage("explain", path, "--format", "json", *more)
+    result = engage("plan", "--why", path, "--format", "json", *more)
     assert result.code == 0
     (pair,) = [pair for pair in json.loads(result.out) if pair["chosen"]]
     return pair["gesture"], pair["phrase"]

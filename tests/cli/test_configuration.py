@@ -1,11 +1,8 @@
-import ast
 import re
-from contextlib import suppress
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import get_args, get_type_hints
 
 import pytest
-from msgspec.structs import fields
 
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.bus.config import BusConfig, Mode, mode_of
@@ -14,9 +11,8 @@ from engage_hri.services.commandline.shell.config import Config, load
 from engage_hri.services.commandline.shell.roster import NAMES, service
 from engage_hri.services.commandline.shell.settings import ELSEWHERE, RobotConfig
 from engage_hri.services.commandline.study import simulate
-from engage_hri.services.recognition.config import RecognitionConfig, Sensing
 from engage_hri.services.runtime.configuration import read
-from engage_hri.services.simulation.config import HumanKind
+from engage_hri.services.tangram.people.config import HumanKind
 
 ROOT = Path(__file__).parents[2]
 
@@ -114,64 +110,9 @@ def test_a_number_out_of_its_range_is_refused_and_says_the_range(setting: str, r
         load(settings=[setting])
 
 
-@pytest.mark.parametrize(
-    ("setting", "reason"),
-    [
-        (
-            "collaboration.pause=0.5",
-            "`pause` is no setting any more, it is fixed at 0.4; take it out",
-        ),
-        (
-            "simulation.stochastic.hears=1",
-            "`stochastic` is no setting any more, it is fixed at what",
-        ),
-    ],
-)
-def test_a_former_setting_is_refused_with_the_value_that_it_has_now(setting: str, reason: str) -> None:
-    with pytest.raises(InputRefused, match=re.escape(reason)):
-        load(settings=[setting])
-
-
-def test_a_former_setting_that_asks_for_the_value_that_it_has_now_changes_nothing(tmp_path: Path) -> None:
-    path = tmp_path / "engage.toml"
-    path.write_text("[recognition]\nwindow = 20.0\nturn_patience = 12\nsensing.robot_face = [0.05, 0, 1.17]\n")
-
-    assert load(path).recognition == RecognitionConfig(window=20.0)
-    path.write_text("[recognition]\nsensing.dwell = 0.2\n")
-    with pytest.raises(InputRefused, match=r"`dwell` is no setting any more, it is fixed at 0\.15"):
-        load(path)
-
-
-SECTIONS = [
-    (section.name, type(value).FIXED)
-    for section in fields(Config)
-    if hasattr(type(value := section.default), "FIXED")
-]
-SECTIONS.append(("recognition", Sensing.FIXED))
-
-
-@pytest.mark.parametrize(("section", "fixed"), SECTIONS)
-def test_a_former_setting_has_the_value_of_a_constant_with_its_name(section: str, fixed: Any) -> None:
-    constants: dict[str, set[object]] = {}
-    for path in (ROOT / "services" / section).rglob("*.py"):
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            match node:
-                case ast.Assign(targets=[ast.Name(id=name)]) | ast.AnnAssign(target=ast.Name(id=name)):
-                    with suppress(ValueError, TypeError, SyntaxError):
-                        constants.setdefault(name, set()).add(ast.literal_eval(node.value))  # type: ignore[arg-type]
-
-    wrong = {
-        name: value
-        for name, value in fixed.items()
-        if not isinstance(value, str | bool) and value not in constants.get(name.upper(), ())
-    }
-    assert fixed
-    assert not wrong
-
-
 def test_a_setting_is_stronger_than_an_option_of_the_simulation_and_the_robots_name_than_a_setting() -> None:
     options = up.Options(seed=3, human="listening", robot="melvin", settings=["simulation.seed=4", "bus.robot=other"])
-    config = options.load()
+    config = options.read(Config)
 
     assert (config.simulation.seed, config.simulation.human, config.robot) == (4, "listening", "melvin")
 

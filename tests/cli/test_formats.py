@@ -47,7 +47,7 @@ def test_commands_write_formats_as_utf8(tmp_path: Path, encoding: str, command: 
         etree.fromstring(done.stdout)
 
 
-@pytest.mark.parametrize("command", ["play", "bml", "explain"])
+@pytest.mark.parametrize("command", ["play", "bml", "plan"])
 def test_standard_input_is_named_where_it_is_wrong(
     engage: Engage, monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:

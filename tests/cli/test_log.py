@@ -120,14 +120,16 @@ def test_what_a_person_has_to_see_to_is_printed_by_commands_that_serve(
     assert capsys.readouterr().err == ("control: the daemon is gone (start it)\n" if alerts else "")
 
 
-def test_what_comes_again_and_again_is_printed_three_times_a_minute() -> None:
-    repeats = logs.Repeats()
-    told = [repeats.told("lost", second) for second in range(120)]
-    printed = [second for second, text in enumerate(told) if text]
+def test_what_comes_again_and_again_is_printed_at_the_first_tenth_and_hundredth_time(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    logs.configure(alerts=True)
+    for _ in range(120):
+        journal.alert(logging.getLogger("engage.control"), "lost")
+    journal.alert(logging.getLogger("engage.control"), "found")
+    logs.configure()
 
-    assert printed == [0, 1, 2, 60, 61, 62]
-    assert told[2] == "lost (again and again: told 3 times a minute)"
-    assert repeats.told("found", 5.0) == "found"
+    assert capsys.readouterr().err == "lost\nlost (for the 10th time)\nlost (for the 100th time)\nfound\n"
 
 
 @pytest.mark.real_time

@@ -15,11 +15,11 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.zenoh.hub import open_hub
-from engage_hri.services.client.robot import connect
+from engage_hri.services.client.connection import connect
 from engage_hri.services.commandline.shell.sources import Thing
 from engage_hri.services.commandline.talk.play import world_with_people
 from engage_hri.services.runtime.service import running
-from engage_hri.services.simulation.still import show_world, tangram_world
+from engage_hri.services.simulation.still import show_world, table_world
 from tests.bus.places import free_endpoint
 from tests.cli.command import FRAGMENT, start
 from tests.cli.test_processes import PATIENCE, line, stopped
@@ -92,7 +92,7 @@ async def test_what_needs_nobody_does_not_wait(
 async def test_a_fragment_is_played_right_after_the_start_before_anybody_is_seen(tmp_path: Path) -> None:
     endpoint = free_endpoint()
     (tmp_path / "ask.xml").write_text(FRAGMENT)
-    world = tangram_world()
+    world = table_world()
     nobody = World(entities=tuple(entity for entity in world.entities if entity.kind != "person"))
     programs = []
     try:

@@ -161,8 +161,8 @@ async def test_a_reader_who_has_had_enough_ends_it_without_a_word(arguments: tup
 COMMANDS_THAT_PRINT = {
     "plan": ("plan", "ask.xml"),
     "bml": ("bml", "ask.xml"),
-    "explain": ("explain", "ask.xml"),
-    "explain as json": ("explain", "ask.xml", "--format", "json"),
+    "plan with reasons": ("plan", "ask.xml", "--why"),
+    "reasons as json": ("plan", "ask.xml", "--why", "--format", "json"),
     "tool": ("tool",),
     "play": ("play", "ask.xml", "--embedded", "--virtual-time"),
     "simulate": ("simulate", "--limit", "12", "--sessions", "2", "--jobs", "2", "--out", "study"),
@@ -255,7 +255,7 @@ async def test_a_second_one_of_a_robot_is_refused_and_the_first_goes_on(endpoint
             told = [(await process.communicate())[1].decode() for process in second]
             _, err = await play.communicate()
 
-        assert [process.returncode for process in second] == [2, UNREADY]
+        assert [process.returncode for process in second] == [UNREADY, UNREADY]
         assert told[0].startswith("up: robot 'only' has this on the bus already (stop what runs there")
         assert told[1].startswith("realizer: robot 'only' has this on the bus already (stop what runs there")
         assert [text.count("\n") for text in told] == [1, 1]
@@ -286,9 +286,9 @@ async def test_of_two_that_are_started_at_once_exactly_one_goes_on(endpoint: str
         out, err = await loser.communicate()
         await line(winner, "all services are up", log=False)
 
-        assert loser.returncode == 2
+        assert loser.returncode == UNREADY
         assert b"all services are up" not in out
-        assert err.startswith(b"up: robot '%s' has this on the bus already" % robot.encode())
+        assert err.startswith(b"up: robot '%s' has this on the bus " % robot.encode())
         assert err.count(b"\n") == 1
         assert sorted(processes_of(robot)) == sorted([winner.pid, *children(winner.pid)])
         assert len(children(winner.pid)) == 5

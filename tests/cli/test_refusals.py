@@ -37,7 +37,7 @@ def bad(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, str, str]
 
 
 @pytest.mark.parametrize(
-    "command", [("plan",), ("explain",), ("play", "--embedded", "--virtual-time")], ids=["plan", "explain", "play"]
+    "command", [("plan",), ("plan", "--why"), ("play", "--embedded", "--virtual-time")], ids=["plan", "why", "play"]
 )
 def test_a_bad_file_is_refused_with_place_and_reason(
     engage: Engage, bad: tuple[Path, str, str], command: tuple[str, ...]
@@ -71,7 +71,9 @@ def test_a_fragment_about_unknown_things_is_refused(engage: Engage, tmp_path: Pa
     assert reason in result.err
 
 
-@pytest.mark.parametrize("command", [("plan",), ("explain",), ("bml",), ("play", "--embedded", "--virtual-time")])
+@pytest.mark.parametrize(
+    "command", [("plan",), ("plan", "--why"), ("bml",), ("play", "--embedded", "--virtual-time")]
+)
 @pytest.mark.parametrize("is_call", [True, False])
 def test_an_unknown_object_costs_only_itself_in_every_command(
     engage: Engage, tmp_path: Path, command: tuple[str, ...], is_call: bool

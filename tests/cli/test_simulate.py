@@ -14,6 +14,7 @@ from engage_hri.services.commandline.shell.config import Config, load
 from engage_hri.services.commandline.study import session as playing
 from engage_hri.services.commandline.study import simulate, workers
 from engage_hri.services.commandline.study.session import Order, SessionResult, play
+from engage_hri.services.commandline.study.tables import FILES, PLOTS, grid
 from engage_hri.services.commandline.study.workers import play_all
 from engage_hri.services.runtime.virtual_time import Deadlock
 from engage_hri.services.study import summary
@@ -50,8 +51,8 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_study_leaves_all_its_files(study: Path) -> None:
-    assert {file.name for file in study.iterdir()} == set(simulate.FILES) - {"failures.txt"}
-    assert all((study / name).read_bytes().startswith(b"\x89PNG") for name in simulate.PLOTS)
+    assert {file.name for file in study.iterdir()} == {*FILES, "study.json"}
+    assert all((study / name).read_bytes().startswith(b"\x89PNG") for name in PLOTS)
 
 
 def test_each_session_is_a_row_and_each_event(study: Path) -> None:
@@ -214,7 +215,7 @@ def test_tables_of_many_sessions_fit_a_narrow_terminal() -> None:
     ]
 
     for table in (summary.hypotheses([found]), summary.overview(records)):
-        assert Console(width=200).measure(simulate.grid(table)).maximum <= 80
+        assert Console(width=200).measure(grid(table)).maximum <= 80
 
 
 # -- what goes wrong --------------------------------------------------------------------------------------------

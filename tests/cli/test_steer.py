@@ -10,10 +10,9 @@ import pytest
 
 from engage_hri.schemas.behaviors import Gesture
 from engage_hri.services.bus.zenoh.hub import open_hub
-from engage_hri.services.client.robot import connect
+from engage_hri.services.client.connection import connect
 from engage_hri.services.commandline.bodies import fault
 from engage_hri.services.commandline.shell.process import UNREADY
-from engage_hri.services.commandline.study import condition
 from engage_hri.services.commandline.talk import play, steer
 from tests.bus.places import free_endpoint
 from tests.cli.command import GOOD_BLOCK, Engage, start
@@ -30,7 +29,7 @@ async def said(process: Process) -> tuple[int, str, str]:
     return process.returncode, out.decode().strip(), err.decode().strip()
 
 
-@pytest.mark.parametrize("module", [condition, fault, play, steer], ids=lambda module: module.__name__)
+@pytest.mark.parametrize("module", [fault, play, steer], ids=lambda module: module.__name__)
 @pytest.mark.parametrize(
     ("mode", "reason"), [("auto", "no process answers at {}"), ("client", "no router answers at {}")]
 )
@@ -41,7 +40,7 @@ def test_who_asks_a_running_robot_once_names_what_cannot_be_reached_and_may_try_
     endpoint, file = free_endpoint(), tmp_path / "block.xml"
     file.write_text(GOOD_BLOCK)
     name = module.__name__.rpartition(".")[2]
-    asked: dict[str, list[object]] = {"condition": ["a"], "fault": ["list"], "play": [file], "steer": ["hold"]}
+    asked: dict[str, list[object]] = {"fault": ["list"], "play": [file], "steer": ["hold"]}
 
     told = engage(name, *asked[name], "--connect", endpoint, "--mode", mode)
 

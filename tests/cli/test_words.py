@@ -48,7 +48,7 @@ def test_the_outcome_for_a_language_model_has_them_too(engage: Engage, ask: Path
 
 
 def test_the_time_for_the_answer_shows_before_anything_moves(engage: Engage, ask: Path) -> None:
-    assert "ask: no references; an answer within 4.5 s" in engage("explain", ask).out
+    assert "ask: no references; an answer within 4.5 s" in engage("plan", "--why", ask).out
     assert "may be answered for 4.5 s: turn-pair" in engage("plan", ask).out
     assert 'limit="4.5"' in engage("bml", ask).out
 

@@ -20,7 +20,7 @@ from engage_hri.services.client.robot import Robot
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.runtime.service import running
-from engage_hri.services.simulation.still import show_world, tangram_world
+from engage_hri.services.simulation.still import show_world, table_world
 from tests.bus.places import PATIENCE, free_endpoint
 
 pytestmark = pytest.mark.real_time
@@ -50,7 +50,7 @@ async def told_by(program: Path, actor: str) -> tuple[list[Message], World]:
     endpoint = free_endpoint()
     services = {
         "recognition": roster.service("recognition", Config()),
-        "simulation": partial(show_world, world=tangram_world()),
+        "simulation": partial(show_world, world=table_world()),
     }
     told: list[Message] = []
     async with (

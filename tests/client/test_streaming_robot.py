@@ -15,13 +15,14 @@ from engage_hri.schemas.tool import Say, ToolInput
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.connection import connect
 from engage_hri.services.client.language_models import Piece, perform_call, stream
-from engage_hri.services.client.robot import Robot, connect
+from engage_hri.services.client.robot import Robot
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.commandline.shell.sources import still
 from engage_hri.services.runtime.service import running
-from engage_hri.services.simulation.still import tangram_world
+from engage_hri.services.simulation.still import table_world
 from tests.cancelling import whole_robot
 
 
@@ -41,7 +42,7 @@ class Stage(NamedTuple):
 @asynccontextmanager
 async def stage() -> AsyncIterator[Stage]:
     services = {name: roster.service(name, load()) for name in roster.ROBOT}
-    services["simulation"] = still(tangram_world())
+    services["simulation"] = still(table_world())
     async with MemoryHub() as hub, running(hub, services), connect(hub=hub) as robot:
         yield Stage(robot, hub.join("perception-too"))
 

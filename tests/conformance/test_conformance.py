@@ -26,7 +26,7 @@ from engage_hri.services.commandline.shell.roster import service
 from engage_hri.services.commandline.shell.sources import still
 from engage_hri.services.requests.ends import Requester, RequestRefused
 from engage_hri.services.runtime.service import Service, running
-from engage_hri.services.simulation.still import tangram_world
+from engage_hri.services.simulation.still import table_world
 from tests.conformance.case import Case, Written, cases
 
 CASES = list(cases(Path(__file__).parent / "cases"))
@@ -79,7 +79,7 @@ async def test_rule(case: Case) -> None:
 
 @asynccontextmanager
 async def _system(seen: Seen, config: Config) -> AsyncIterator[Requester]:
-    services: dict[str, Service] = {"simulation": still(tangram_world())}
+    services: dict[str, Service] = {"simulation": still(table_world())}
     services |= {name: service(name, config) for name in ("realizer", "control", "recognition")}
     async with MemoryHub() as hub, running(hub, services):
         bus = hub.join("test")

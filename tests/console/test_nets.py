@@ -13,9 +13,9 @@ from engage_hri.schemas.nets import Fired, NetMarked, NetPlace, NetPlanned, NetP
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.commandline.talk.net_drawing import drawing, legend
 from engage_hri.services.console import nets
+from engage_hri.services.console.net_layout import laid_out
 from engage_hri.services.console.nets import NetInView, feed, in_view, told, where
 from engage_hri.services.console.terminal.live import NetLog
-from engage_hri.services.console.web.net_layout import laid_out
 from tests.random_cases import share_of
 
 AT = Stamp("clock", 0.0)

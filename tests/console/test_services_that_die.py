@@ -98,7 +98,7 @@ def test_a_body_without_control_says_nothing_and_looks_at_nothing() -> None:
 
 
 def test_a_claim_of_a_start_or_of_a_seat_is_neither_a_service_nor_news() -> None:
-    claims = ("up-starting-0123abcd", "seat-0123abcd-ann", "visitor.seat-0123abcd-ann", "room-up-starting-0123abcd")
+    claims = ("seat-0123abcd-ann", "visitor.seat-0123abcd-ann")
     made = picture(*((PeerAlive(participant=name, run="1"), 11.0) for name in (*claims, "up-0123abcd", "seat-ann")))
     made.feed(ActionBegan(actor="ann", action="look", targets=(), at=at(12.0)), 12.0, 12.0)
     for name in claims:

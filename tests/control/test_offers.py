@@ -11,9 +11,9 @@ import pytest
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.control.bases import drivers
 from engage_hri.services.control.bases.driver_guard import GuardedBody
-from engage_hri.services.control.bases.offers import BODIES, VOICES, offers
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.torso.body import SimulatedBody
+from engage_hri.services.runtime.offers import BODIES, VOICES, offers
 
 DRIVER = """
 from tests.control.test_drivers import Bare

@@ -13,10 +13,10 @@ from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.talk.offline_plan import generated
 from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
-from engage_hri.services.simulation.still import tangram_world
+from engage_hri.services.simulation.still import table_world
 from tests.generation.partners import Partners, stage
 
-WORLD = tangram_world()
+WORLD = table_world()
 
 
 def refers(id: str, status: str, *targets: str, index: int = 1, addressee: str = "") -> TurnFragment:

@@ -18,9 +18,9 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.services.generation.fragment_check import checked
 from engage_hri.services.generation.lost import bearable
-from engage_hri.services.simulation.still import tangram_world
+from engage_hri.services.simulation.still import table_world
 
-WORLD = tangram_world()
+WORLD = table_world()
 WORDS = Speech(id="words", text="Here it is.")
 
 

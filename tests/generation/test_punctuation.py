@@ -12,10 +12,10 @@ from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.talk.offline_plan import generated
-from engage_hri.services.simulation.still import tangram_world
+from engage_hri.services.simulation.still import table_world
 from tests.generation.emitted import LOOK, Made, block, by_id, lines, reference, speech
 
-WORLD = tangram_world()
+WORLD = table_world()
 REFERENCE = """<ebml:reference id="{0}" target="blue-square" minReliability="0.6">
 <speechOption text="the square" cost="2"/></ebml:reference>"""
 XML = f"""<ebml:ebml xmlns:ebml="edu.wpi.ebml" xmlns="org.mindmakers.bml" id="f">

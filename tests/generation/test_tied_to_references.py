@@ -22,7 +22,7 @@ from engage_hri.services.commandline.talk.offline_plan import generated
 from engage_hri.services.commandline.talk.plan import rehearsed
 from engage_hri.services.generation.block.rewriting import Operator
 from engage_hri.services.runtime.virtual_time import run_virtual
-from engage_hri.services.simulation.still import tangram_world
+from engage_hri.services.simulation.still import table_world
 from tests.generation.emitted import LOOK, POINT, Made, block, by_id, lines, reference, speech
 
 PROFILES = ("check-back", "figure-3.3")
@@ -31,7 +31,7 @@ TIED: dict[str, FragmentBehavior] = {
     "gesture": Gesture(id="x", lexeme="BEAT"),
     "face": FaceLexeme(id="x", lexeme="SMILE"),
 }
-WORLD = tangram_world()
+WORLD = table_world()
 
 
 def fragment(*operators: Operator, extra: FragmentBehavior = TIED["nod"], status: str = "middle") -> TurnFragment:

@@ -16,7 +16,7 @@ import jsonschema  # type: ignore[import-untyped]
 import pytest
 import yaml  # type: ignore[import-untyped]
 
-from engage_hri.services.commandline.robot.certificates import initialize
+from engage_hri.services.bus.certificates import initialize
 from tests.bus.places import free_endpoint
 from tests.cli.command import FRAGMENT
 from tests.lab.lab import laboratory, missing

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from engage_hri.services.commandline.robot.certificates import initialize
+from engage_hri.services.bus.certificates import initialize
 from tests.lab.lab import PATHS, _child_of, missing
 from tests.lab.systemd import INIT
 from tests.lab.test_deploy import FILES

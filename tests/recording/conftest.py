@@ -13,7 +13,7 @@ from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.control.testing.plugin import virtual_loop
 from engage_hri.services.recording.disk import read
 from engage_hri.services.recording.reading import Recording
-from engage_hri.services.simulation.config import SimulationConfig
+from engage_hri.services.tangram.people.config import SimulationConfig
 from tests import plays
 from tests.recording.runs import tangram
 

@@ -12,11 +12,11 @@ from engage_hri.schemas.recognition import Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.study.analyse import compare, found, numbered
-from engage_hri.services.commandline.study.analysing import Session, sessions
+from engage_hri.services.commandline.study.recorded_sessions import Session, sessions
 from engage_hri.services.recording.disk import read
-from engage_hri.services.simulation.config import SimulationConfig
 from engage_hri.services.study.permutation import separate
 from engage_hri.services.study.records import SessionRecorder as Record
+from engage_hri.services.tangram.people.config import SimulationConfig
 from tests.recording.files import bytes_of
 from tests.recording.runs import tangram
 from tests.study.sessions import session as made

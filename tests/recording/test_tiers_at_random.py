@@ -27,7 +27,7 @@ from engage_hri.services.recording.disk import read
 from engage_hri.services.recording.tiers import tiers
 from engage_hri.services.reports.ongoing_actions import OngoingActionTracker
 from engage_hri.services.runtime.service import running
-from engage_hri.services.simulation.config import SimulationConfig
+from engage_hri.services.tangram.people.config import SimulationConfig
 from tests.recording.conftest import Anchor
 from tests.recording.files import bytes_of, sample
 from tests.recording.oracle import Oracle, Stretch

@@ -11,8 +11,6 @@ from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.collaboration.config import CollaborationConfig
-from engage_hri.services.collaboration.service import collaborate
 from engage_hri.services.control.config import ControlConfig, Variability
 from engage_hri.services.control.service import embody
 from engage_hri.services.generation.config import Condition, GenerationConfig
@@ -22,9 +20,11 @@ from engage_hri.services.realizer.service import realize
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.service import recognize
 from engage_hri.services.runtime.service import Ready, Service, running
-from engage_hri.services.simulation.config import SimulationConfig
-from engage_hri.services.simulation.habits import Habits
-from engage_hri.services.simulation.service import simulate
+from engage_hri.services.tangram.collaboration.config import CollaborationConfig
+from engage_hri.services.tangram.collaboration.service import collaborate
+from engage_hri.services.tangram.people.config import SimulationConfig
+from engage_hri.services.tangram.people.habits import Habits
+from engage_hri.services.tangram.people.service import simulate
 from tests.bus.faulty import Faults, FaultyHub
 
 LIMIT = 900.0

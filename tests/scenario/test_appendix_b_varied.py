@@ -2,8 +2,8 @@
 
 import pytest
 
-from engage_hri.services.collaboration import plans
 from engage_hri.services.runtime.virtual_time import run_virtual
+from engage_hri.services.tangram.collaboration import plans
 from tests.bus.faulty import Faults
 from tests.scenario.playing import play
 from tests.scenario.test_appendix_b import EXPECTED, by_step, played

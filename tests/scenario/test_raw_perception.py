@@ -11,7 +11,7 @@ import pytest
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.faults import Fault
 from engage_hri.services.runtime.virtual_time import run_virtual
-from engage_hri.services.simulation.config import PerceptionFaults, SimulationConfig
+from engage_hri.services.tangram.people.config import PerceptionFaults, SimulationConfig
 from tests.scenario.playing import Record, play
 from tests.scenario.test_appendix_b import ENDINGS, EXPECTED, by_step
 

@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 import pytest
+from engage_hri.services.commandline.study.tangram import play_tangram
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
@@ -18,19 +19,19 @@ from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.summary import summary
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.connection import connect
 from engage_hri.services.client.language_models import perform_call
 from engage_hri.services.client.people.perceive import perceive
 from engage_hri.services.client.people.perceived_person import PerceivedPerson
-from engage_hri.services.client.robot import Robot, connect
+from engage_hri.services.client.robot import Robot
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import Config, load
-from engage_hri.services.commandline.study.tangram import play_tangram
 from engage_hri.services.console.follow import following
 from engage_hri.services.generation.turns.events import WORDS_PATIENCE
 from engage_hri.services.runtime.service import running
-from engage_hri.services.simulation.still import show_world, tangram_world
+from engage_hri.services.simulation.still import show_world, table_world
 
-TABLE = tangram_world()
+TABLE = table_world()
 EMPTY = World(entities=tuple(each for each in TABLE.entities if each.kind not in ("person", "hand")))
 
 

@@ -1,5 +1,7 @@
 """The attentive person: follows looks and points, meets the robot's eyes, answers what it has said."""
 
+from functools import partial
+
 import pytest
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded
@@ -11,13 +13,15 @@ from engage_hri.schemas.units import Stamp
 from engage_hri.services.simulation.attentive import AttentiveHuman
 from engage_hri.services.simulation.human import FACE, Act, Grab, Lay, LookAt, Start, Stop
 from engage_hri.services.simulation.still import Bystander
-from engage_hri.services.tangram.table import TangramTable, tangram_table
+from engage_hri.services.tangram.people.requests import requested_placement
+from engage_hri.services.tangram.table import tangram_table
 
 AT = Stamp("loop", 0.0)
+ASKED = partial(requested_placement, table=tangram_table())
 
 
-def person(table: TangramTable | None = None) -> AttentiveHuman:
-    return AttentiveHuman("ann", frozenset({"cup", "ball"}), "robot", table=table)
+def person() -> AttentiveHuman:
+    return AttentiveHuman("ann", frozenset({"cup", "ball"}), "robot")
 
 
 def robot_does(action: Action, target: str) -> ActionBegan:
@@ -80,7 +84,9 @@ def test_they_answer_a_question_in_words() -> None:
 
 def test_at_the_tangram_table_they_do_what_is_asked() -> None:
     says(
-        human := person(tangram_table()), "Move the blue square so that it is touching the top of the rectangle", 1.0
+        human := AttentiveHuman("ann", frozenset(), asked=ASKED),
+        "Move the blue square so that it is touching the top of the rectangle",
+        1.0,
     )
 
     done = acts(human, 3.0)

@@ -13,9 +13,9 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.units import Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.robot import connect
+from engage_hri.services.client.connection import connect
 from engage_hri.services.runtime.service import running
-from engage_hri.services.simulation.still import EXAMPLE, load_world, show_world, tangram_world
+from engage_hri.services.simulation.still import EXAMPLE, load_world, show_world, table_world
 
 COMMANDS = (Path(__file__).parents[2] / "docs/commands.md").read_text()
 CUP = '{"id": "cup", "kind": "object", "position": [0.5, 0.1, 0.8]}'
@@ -32,7 +32,7 @@ def test_a_world_is_a_list_of_entities(tmp_path: Path) -> None:
 
 
 def test_a_world_of_the_bus_can_be_kept_in_a_file(tmp_path: Path) -> None:
-    world = msgspec.structs.replace(tangram_world(), at=Stamp(clock="loop", seconds=3.0))
+    world = msgspec.structs.replace(table_world(), at=Stamp(clock="loop", seconds=3.0))
     file = tmp_path / "world.json"
     file.write_bytes(msgspec.json.encode(world))
 
@@ -106,7 +106,7 @@ def test_a_world_that_is_not_there_is_refused(tmp_path: Path) -> None:
 
 
 def test_without_a_file_there_is_the_tangram_table_and_a_person() -> None:
-    world = tangram_world()
+    world = table_world()
 
     assert len(world.objects) == 10
     assert [person.id for person in world.people] == ["human"]
@@ -114,14 +114,14 @@ def test_without_a_file_there_is_the_tangram_table_and_a_person() -> None:
 
 
 async def test_a_still_world_is_there_for_whoever_comes_later(hub: MemoryHub) -> None:
-    async with running(hub, {"simulation": partial(show_world, world=tangram_world())}):
+    async with running(hub, {"simulation": partial(show_world, world=table_world())}):
         with hub.join("late").subscribe(keys.PERCEIVED_ACTION) as found:
             async with connect(hub=hub) as robot:
                 world = await robot.world()
             assert len(found) == 1
 
     assert isinstance(world, World)
-    assert world.entities == tangram_world().entities
+    assert world.entities == table_world().entities
 
 
 @pytest.mark.parametrize("source", [EXAMPLE, re.search(r"\{\"entities\".*?\]\}\n", COMMANDS, re.DOTALL)])

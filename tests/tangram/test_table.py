@@ -6,6 +6,8 @@ import pytest
 
 from engage_hri.schemas.footprints import PiecePose, edges, overlap, poses_touching, touches
 from engage_hri.schemas.world import Entity
+from engage_hri.services.simulation.still import table_world
+from engage_hri.services.tangram.people.table import Table
 from engage_hri.services.tangram.table import tangram_table
 
 TABLE = tangram_table()
@@ -72,3 +74,10 @@ def test_a_longer_edge_does_not_touch_a_shorter_one() -> None:
     green = TABLE.piece("green-square")
 
     assert side_of(TABLE.lying(green, PiecePose(0.55, 0.07)), GOAL["rectangle"]) is None
+
+
+def test_the_world_of_the_core_is_this_table_at_the_start() -> None:
+    table = Table(TABLE)
+    table.seated = True
+
+    assert table_world().entities == table.entities(0.0)

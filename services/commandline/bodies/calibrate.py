@@ -12,10 +12,10 @@ from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.world import Entity
-from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.options import Configured
 from engage_hri.services.commandline.shell.process import DONE, run, typed
 from engage_hri.services.commandline.shell.result_folder import ResultFile
+from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.control.calibrating.fitting import Fit, Measurement, fit
 from engage_hri.services.control.calibrating.measuring import OTHER_ROWS, Eyes, SimulatedEyes, marks, measured
 from engage_hri.services.control.contract.body import Body, BodyState
@@ -100,7 +100,7 @@ def main(options: Options) -> int:
 
 async def _calibrate(
     options: Options,
-    config: Config,
+    config: RobotConfig,
     parts: Sequence[str],
     known: Sequence[Measurement] | None,
     out: ResultFile,

@@ -9,9 +9,9 @@ from engage_hri.schemas.body import Capabilities, FaultKind
 from engage_hri.schemas.body_faults import BodyFault, kind_of, parts_of, told
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.options import Connected
 from engage_hri.services.commandline.shell.process import DONE, run_until_signal, unique_name
+from engage_hri.services.commandline.shell.settings import RobotConfig
 
 PATIENCE: Seconds = 5.0
 """Seconds in which control has to answer."""
@@ -45,7 +45,7 @@ def main(options: Options) -> int:
     return DONE
 
 
-async def _switch(options: Options, config: Config) -> None:
+async def _switch(options: Options, config: RobotConfig) -> None:
     from engage_hri.services.client.robot import Robot
 
     async with (

@@ -17,11 +17,11 @@ import typer
 
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.services.commandline.look.with_window import cannot_listen, lacking, not_installed
-from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.failing_output import complain
 from engage_hri.services.commandline.shell.options import Connected, Shown
 from engage_hri.services.commandline.shell.process import DONE, forever, run_until_signal, unique_name, until_closed
 from engage_hri.services.commandline.shell.recording_file import opened
+from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.commandline.shell.sources import Thing, read_source
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ async def _play(options: Options, recording: "Recording") -> None:
     await _serve(options, server.recorded(recording, _hosts(options)), "", forever)
 
 
-async def _show(options: Options, config: Config, things: tuple[Thing, ...]) -> None:
+async def _show(options: Options, config: RobotConfig, things: tuple[Thing, ...]) -> None:
     server = _web()
     from engage_hri.services.bus.zenoh.neighbors import hinting
     from engage_hri.services.console.web.orders import RIGHTS

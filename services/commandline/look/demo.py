@@ -10,13 +10,14 @@ import typer
 from rich.console import Console
 
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.services.commandline.embedding import play_tangram
 from engage_hri.services.commandline.look.with_window import can_open, lacking, not_installed, windowed
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.options import Embodied, Shown, Simulated, VirtualTime, Written
 from engage_hri.services.commandline.shell.outputs import Outputs
 from engage_hri.services.commandline.shell.process import DONE, run
 from engage_hri.services.commandline.shell.recording_file import needed
-from engage_hri.services.commandline.study.tangram import DEFAULTS, play_tangram
+from engage_hri.services.commandline.shell.settings import TRANSCRIPT
 from engage_hri.services.console.follow import Sink
 from engage_hri.services.console.terminal import tally
 from engage_hri.services.console.terminal.live import Tallying, scene_view
@@ -52,7 +53,7 @@ class Options(Written, Simulated, Embodied, Shown):
 
 
 def main(options: Options) -> int:
-    config = options.load(defaults=FOR_YOU if options.you else DEFAULTS)
+    config = options.read(Config, defaults=FOR_YOU if options.you else TRANSCRIPT)
     _check(options)
     with Outputs(options.events, options.feedback) as outputs:
         console = outputs.console(quiet=options.quiet)

@@ -18,11 +18,11 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.failing_output import FORMAT, Patient, as_file, settle, standard_output
 from engage_hri.services.commandline.shell.options import Connected
 from engage_hri.services.commandline.shell.outputs import Terminal
 from engage_hri.services.commandline.shell.process import DONE, forever, run_until_signal, unique_name
+from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.console.follow import FOLLOWED, Sink, following
 from engage_hri.services.console.terminal.live import Log, NetLog
 from engage_hri.services.console.terminal.log import Telling
@@ -121,40 +121,32 @@ def main(options: Options) -> int:
         reason, advice = "shows nets and nothing else", "leave out --only, --actor and --kind"
         raise InputRefused(Fault(reason=reason, where="--net", advice=advice))
     out = standard_output(encoding=FORMAT if options.json else "")
-    run_until_signal(_watch_nets(options, config, out) if options.net else _watch(options, config, wanted, out))
+    run_until_signal(_watch(options, config, wanted, out))
     settle(out)
     return DONE
 
 
-async def _watch(options: Options, config: Config, wanted: Wanted, out: Patient) -> None:
+async def _watch(options: Options, config: RobotConfig, wanted: Wanted, out: Patient) -> None:
     from engage_hri.services.bus.zenoh.neighbors import hinting
 
     async with await options.open(config.bus, "viewer") as hub:
         bus = hub.join(unique_name("watch"))
         # Text without a selection includes what people do and say, but no statistics, which would drown the rest.
         everything = wanted.is_everything and not options.json
-        telling = Telling(statistics=not everything)
-        show: Sink = Log(Terminal(file=as_file(out)), config.robot, bus.now(), telling)
+        show: Sink
         if options.json:
             show = _as_json(out)
+        elif options.net:
+            show = NetLog(Terminal(file=as_file(out)), bus.now())
+        else:
+            show = Log(Terminal(file=as_file(out)), config.robot, bus.now(), Telling(statistics=not everything))
 
         def tell(message: Message, at: Seconds) -> None:
-            if everything or wanted.includes(message):
+            if options.net or everything or wanted.includes(message):
                 show(message, at)
 
-        async with following(bus, (tell,), patterns=wanted.patterns, kinds=wanted.kinds):
-            bus.declare_alive()
-            async with hinting(bus, config.bus.connect):
-                await forever()
-
-
-async def _watch_nets(options: Options, config: Config, out: Patient) -> None:
-    from engage_hri.services.bus.zenoh.neighbors import hinting
-
-    async with await options.open(config.bus, "viewer") as hub:
-        bus = hub.join(unique_name("watch"))
-        show: Sink = _as_json(out) if options.json else NetLog(Terminal(file=as_file(out)), bus.now())
-        async with following(bus, (show,), patterns=(keys.NET, keys.HELD)):
+        patterns = (keys.NET, keys.HELD) if options.net else wanted.patterns
+        async with following(bus, (tell,), patterns=patterns, kinds=wanted.kinds):
             bus.declare_alive()
             async with hinting(bus, config.bus.connect):
                 await forever()

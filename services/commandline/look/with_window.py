@@ -15,7 +15,7 @@ from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Hub
 from engage_hri.services.commandline.shell.options import Shown
-from engage_hri.services.commandline.shell.supervisor import ended_in_order, spawned, without_threads
+from engage_hri.services.commandline.shell.supervisor import each_line, ended_in_order, spawned, without_threads
 from engage_hri.services.runtime.installation import extra_command
 
 NEEDED = ("starlette", "uvicorn", "nicegui")
@@ -74,7 +74,7 @@ async def windowed(robot: str, shown: Shown, began: Seconds, tell: Callable[[str
     # The child first: until it has loaded the web stack, the hub is there.
     with without_threads():
         async with (
-            spawned(_end, *_command(robot, endpoint, shown, began)) as process,
+            spawned(ended_in_order, *_command(robot, endpoint, shown, began)) as process,
             await open_hub(robot, listen=(endpoint,), mode="peer") as hub,
         ):
             telling = asyncio.create_task(_pass_on(process, tell), name="window")
@@ -102,16 +102,5 @@ def _free_port(host: str = "127.0.0.1") -> int:
 async def _pass_on(process: Process, tell: Callable[[str], None]) -> int:
     """Tell what it says until it has ended. Returns its exit code."""
     assert process.stdout is not None
-    while line := await process.stdout.readline():
-        tell(f"the window: {line.decode(errors='replace').rstrip()}")
+    await each_line(process.stdout, lambda line: tell(f"the window: {line.decode(errors='replace').rstrip()}"))
     return await process.wait()
-
-
-async def _end(process: Process) -> None:
-    await ended_in_order(process, _drained)
-
-
-async def _drained(process: Process) -> None:
-    assert process.stdout is not None
-    while await process.stdout.read(2**16):
-        pass

@@ -8,7 +8,14 @@ from contextlib import asynccontextmanager
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.sight import Sight
-from engage_hri.services.commandline.shell.supervisor import ended_in_order, ending, killed, spawned, without_threads
+from engage_hri.services.commandline.shell.supervisor import (
+    each_line,
+    ended_in_order,
+    ending,
+    killed,
+    spawned,
+    without_threads,
+)
 from engage_hri.services.requests.deadlines import Silences
 
 SIGN = "\x06"
@@ -22,8 +29,6 @@ BEGINNING: Seconds = 30.0
 BRIEF: Seconds = 2.0
 """Life of a child after which the next one does not come at once, but after `PAUSE`."""
 PAUSE: Seconds = 0.5
-LONGEST = 2**17
-"""Bytes of a line that is passed on: a key in Zenoh's log has up to 2**16."""
 
 
 async def watched(
@@ -69,7 +74,7 @@ async def _piped(command: Sequence[str]) -> AsyncIterator[tuple[Process, asyncio
     writing = os.fdopen(its, "wb", 0)
     reading, _ = await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(lines), os.fdopen(ours, "rb", 0))
     try:
-        async with spawned(_end, *command, str(its), shared=(its,)) as process:
+        async with spawned(ended_in_order, *command, str(its), shared=(its,)) as process:
             writing.close()  # the pipe ends with the process
             yield process, lines
     finally:
@@ -101,7 +106,10 @@ async def _listen(
             is_alive()
 
     is_alive()
-    reading = {asyncio.create_task(_each(lines, take)), asyncio.create_task(_each(process.stdout, take_other))}
+    reading = {
+        asyncio.create_task(each_line(lines, take)),
+        asyncio.create_task(each_line(process.stdout, take_other)),
+    }
     left = reading
     try:
         while left:
@@ -116,27 +124,3 @@ async def _listen(
         for each in reading:
             each.cancel()
         await asyncio.wait(reading)
-
-
-async def _each(stream: asyncio.StreamReader, take: Callable[[bytes], None]) -> None:
-    """Take each line of a stream, in pieces: whoever waits for each line of a flood holds up who writes it."""
-    rest = b""
-    while piece := await stream.read(LONGEST):
-        *lines, rest = (rest + piece).split(b"\n")
-        if len(rest) > LONGEST:
-            lines.append(rest)
-            rest = b""
-        for line in lines:
-            take(line if len(line) <= LONGEST else b"(a line too long to show)")
-    if rest:
-        take(rest)
-
-
-async def _end(process: Process) -> None:
-    await ended_in_order(process, _drained)
-
-
-async def _drained(process: Process) -> None:
-    assert process.stdout is not None
-    while await process.stdout.read(2**16):
-        pass

@@ -11,7 +11,6 @@ from engage_hri.services.commandline.shell.failing_output import print_format
 from engage_hri.services.commandline.shell.options import Connected
 from engage_hri.services.commandline.shell.outputs import Terminal
 from engage_hri.services.commandline.shell.process import DONE, run
-from engage_hri.services.commandline.shell.settings import ELSEWHERE, RobotConfig
 from engage_hri.services.doctor.findings import findings
 from engage_hri.services.doctor.report import as_json, report
 
@@ -28,7 +27,7 @@ class Options(Connected):
 
 def main(options: Options) -> int:
     """Examine once. Exit 1 if something is wrong."""
-    config = options.read(RobotConfig, elsewhere=ELSEWHERE)
+    config = options.load()
     signal.alarm(LONGEST)  # ends the process even where Zenoh stands still
     try:
         return run(_examine(config.bus, options.json))
@@ -37,7 +36,7 @@ def main(options: Options) -> int:
 
 
 async def _examine(bus: BusConfig, is_json: bool) -> int:
-    from engage_hri.services.commandline.robot.examine import examining
+    from engage_hri.services.doctor.service import examining
 
     async with examining(bus) as facts:
         found = findings(facts)

@@ -51,7 +51,7 @@ def main(options: Options) -> int:
 
 
 def _done(options: Options) -> int:
-    from engage_hri.services.commandline.robot import certificates
+    from engage_hri.services.bus import certificates
 
     folder, named = options.folder, options.holders or []
     if folder.exists() and not folder.is_dir():
@@ -82,7 +82,7 @@ def _done(options: Options) -> int:
 
 
 def _show(folder: Path) -> int:
-    from engage_hri.services.commandline.robot.certificates import shown
+    from engage_hri.services.bus.certificates import shown
 
     now, code = datetime.now(UTC), DONE
     for each in shown(folder):

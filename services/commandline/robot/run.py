@@ -14,8 +14,8 @@ from engage_hri.services.commandline.shell import forced_exit, roster
 from engage_hri.services.commandline.shell.failing_output import complain
 from engage_hri.services.commandline.shell.options import Embodied, Listening
 from engage_hri.services.commandline.shell.process import DONE, run_until_signal, unique_name, until_closed
-from engage_hri.services.commandline.shell.roster import ROBOT
-from engage_hri.services.commandline.shell.settings import ELSEWHERE, RobotConfig
+from engage_hri.services.commandline.shell.roster import ROBOT, complete
+from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.runtime.service import Service, running
 
 
@@ -48,7 +48,7 @@ def main(options: Options) -> int:
     if options.attended:
         forced_exit.end_after_the_parent()
     on_robot = {*names} <= {*ROBOT}
-    config = options.read(RobotConfig, elsewhere=ELSEWHERE) if on_robot else options.load()
+    config = options.load() if on_robot else options.read(complete())
     run_until_signal(_serve(options, names, config))
     return DONE
 

@@ -6,10 +6,10 @@ Each service documents its own section in its `config.py`; docs/configuration.md
 from collections.abc import Iterable
 from pathlib import Path
 
-from engage_hri.services.collaboration.config import CollaborationConfig
 from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.runtime.configuration import read
-from engage_hri.services.simulation.config import SimulationConfig
+from engage_hri.services.tangram.collaboration.config import CollaborationConfig
+from engage_hri.services.tangram.people.config import SimulationConfig
 
 
 class Config(RobotConfig, frozen=True, kw_only=True, forbid_unknown_fields=True):

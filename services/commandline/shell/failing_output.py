@@ -9,7 +9,6 @@ from contextlib import suppress
 from typing import IO, BinaryIO, TextIO, cast
 
 from engage_hri.schemas.faults import Fault, RunFailed
-from engage_hri.services.bus.often import is_told
 
 LOG = logging.getLogger("engage")
 Put = Callable[[bytes], int | None]
@@ -19,44 +18,49 @@ Put = Callable[[bytes], int | None]
 class Patient:
     """Text file that takes what there is room for, and drops the rest line by line.
 
-    A line that is begun is finished before the next, so that none is torn. Told are the first interruption, the 10th,
-    the 100th, and how each of these ended. Only a reader that has gone (BrokenPipeError) is raised.
+    A line that is begun is finished before the next, so that none is torn. Once it tells that lines are lost, and
+    how many when there is room again; `settle` tells the number of all. Only a reader that has gone
+    (BrokenPipeError) is raised.
     """
 
     def __init__(
-        self, name: str, put: Put, tell: Callable[[str], None], encoding: str = "utf-8", begin: str = ""
+        self, name: str, put: Put, tell: Callable[[str], None], encoding: str = "utf-8", stream: TextIO | None = None
     ) -> None:
-        """name: of the file, for people. begin: text before all else, which is never dropped."""
+        """name: of the file, for people. stream: the one of Python for which this stands, which may be a terminal."""
         self.name = name
         self.encoding = encoding
         self.lost = 0
         """Number of lines that were dropped."""
         self._put = put
         self._tell = tell
-        self._unwritten = begin.encode(encoding)
-        self._lost_before = 0
-        """Number of lines that were lost before the present interruption."""
-        self._interruptions = 0
-        self._interrupted = False
+        self._unwritten = b""
+        self._stream = stream
+        self._told = 0
+        """What was told: 1: that lines are lost, 2: that they are written again."""
         self._reason = ""
 
     def write(self, text: str) -> int:
         """Write whole lines, or drop them. Returns the length of the text, as files do."""
-        data, lost_before = text.encode(self.encoding, errors="backslashreplace"), self.lost
+        data = text.encode(self.encoding, errors="backslashreplace")
         self._unwritten = self._push(self._unwritten)
         left = data if self._unwritten else self._push(data)
         if len(left) == len(data) > 0:
             self.lost += data.count(b"\n") or 1
+            if self._told == 0:
+                self._told = 1
+                self._tell(f"{self.name}: cannot write: {self._reason}; lines are lost until there is room")
         elif left:
             self._unwritten = left
-        self._note(bool(left or self._unwritten), lost_before)
+        elif self._told == 1 and not self._unwritten:
+            self._told = 2
+            self._tell(f"{self.name} is written again; {_lines(self.lost)} lost")
         return len(text)
 
     def flush(self) -> None:
         """Nothing: all is written at once."""
 
     def isatty(self) -> bool:
-        return False
+        return self._stream is not None and self._stream.isatty()
 
     def settle(self) -> Fault | None:
         """Write what is left of the last line. Returns what to tell if anything was lost."""
@@ -84,40 +88,6 @@ class Patient:
             data = data[written:]
         return data
 
-    def _note(self, is_interrupted: bool, lost_before: int) -> None:
-        if is_interrupted == self._interrupted:
-            return
-        self._interrupted = is_interrupted
-        if is_interrupted:
-            self._interruptions += 1
-            self._lost_before = lost_before
-        if is_told(self._interruptions):
-            often = f" (for the {self._interruptions}th time)" if self._interruptions > 1 else ""
-            if is_interrupted:
-                self._tell(f"{self.name}: cannot write: {self._reason}{often}; lines are lost until there is room")
-            else:
-                self._tell(f"{self.name} is written again; {_lines(self.lost - self._lost_before)} lost")
-
-
-class PatientStream(Patient):
-    """Patient standard output or error: the stream that Python has there when this is made."""
-
-    def __init__(self, name: str, stream: TextIO | None, begin: str = "", encoding: str = "") -> None:
-        """stream: None stands for one that is closed; nothing is written then, and nothing lost.
-
-        encoding: empty: the stream's own.
-        """
-        self._stream = stream
-        if stream is None:
-            super().__init__(name, len, LOG.warning)
-            return
-        with suppress(OSError):
-            stream.flush()
-        super().__init__(name, beneath(stream).write, LOG.warning, encoding or stream.encoding or "utf-8", begin)
-
-    def isatty(self) -> bool:
-        return self._stream is not None and self._stream.isatty()
-
 
 def without_waiting(number: int, data: bytes) -> int | None:
     """Write to a file by its number if there is room, else nothing: one who stops reading must stop nobody."""
@@ -132,9 +102,22 @@ FORMAT = "utf-8"
 """Encoding of a format, such as JSON and XML: its readers are programs, which know nothing of our terminal."""
 
 
-def standard_output(begin: str = "", encoding: str = "") -> PatientStream:
+def standard_output(encoding: str = "") -> Patient:
     """Standard output for lines as they come. encoding: `FORMAT` for lines of a format; empty: the terminal's."""
-    return PatientStream("standard output", sys.stdout, begin, encoding)
+    return _standing_for("standard output", sys.stdout, encoding)
+
+
+def standard_error() -> Patient:
+    return _standing_for("standard error", sys.stderr)
+
+
+def _standing_for(name: str, stream: TextIO | None, encoding: str = "") -> Patient:
+    """File that writes where a stream of Python does. stream: None: a closed one; nothing is written, nor lost."""
+    if stream is None:
+        return Patient(name, len, LOG.warning)
+    with suppress(OSError):
+        stream.flush()
+    return Patient(name, beneath(stream).write, LOG.warning, encoding or stream.encoding or "utf-8", stream)
 
 
 def print_format(text: str) -> None:
@@ -143,10 +126,6 @@ def print_format(text: str) -> None:
         sys.stdout.flush()
         sys.stdout.buffer.write(f"{text}\n".encode(FORMAT, errors="backslashreplace"))
         sys.stdout.buffer.flush()
-
-
-def standard_error() -> PatientStream:
-    return PatientStream("standard error", sys.stderr)
 
 
 def beneath(stream: TextIO) -> BinaryIO:

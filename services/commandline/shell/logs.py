@@ -6,26 +6,27 @@ a file.
 
 import logging
 import sys
-from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from datetime import datetime
 from io import FileIO
 from pathlib import Path
+from typing import Any
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.utf8 import printable
 from engage_hri.services.bus import journal
+from engage_hri.services.bus.often import Often
 from engage_hri.services.commandline.shell.failing_output import Patient, without_waiting
 
 LEVELS = {name.lower(): getattr(logging, name) for name in ("DEBUG", "INFO", "WARNING", "ERROR")}
 SOURCES = tuple(dict.fromkeys((*journal.NAMED, *keys.ROLES, "peers", "up")))
 """Sources with a level of their own: services, the roles of others, `peers` (who comes and goes), and `engage up`."""
 
-LINES = 200
-"""Lines of which it is known how often they were told."""
+CALM: Seconds = 60.0
+"""Time without a line of an alert after which it counts as a new one, as of a device that is lost and found."""
 HANDLER = "engage"
 """Name of the handlers made here."""
 
@@ -61,7 +62,7 @@ class StandardError(logging.Handler):
         """alerts: print also what of services a person has to see to (`journal.alert`)."""
         super().__init__()
         self._alerts = alerts
-        self._repeats = Repeats()
+        self._repeats = Often(CALM)
         encoding = getattr(sys.stderr, "encoding", None) or "utf-8"
         self._lines = Patient("standard error", self._put, self.tell, encoding)
 
@@ -69,13 +70,14 @@ class StandardError(logging.Handler):
         if record.levelno >= (logging.WARNING if record.name == "engage" else logging.ERROR):
             self.tell(self.format(record))
         elif self._alerts and getattr(record, journal.ALERT, False):
-            self.tell(self._repeats.told(self.format(record), record.created))
+            text = self.format(record)
+            if times := self._repeats.tell(text, "", record.created):
+                self.tell(text if times == 1 else f"{text} (for the {times}th time)")
 
     def tell(self, text: str) -> None:
         """Print a line, if there is room."""
-        if text:
-            with suppress(OSError):
-                self._lines.write(f"{text}\n")
+        with suppress(OSError):
+            self._lines.write(f"{text}\n")
 
     def _put(self, data: bytes) -> int | None:
         if (stream := sys.stderr) is None:
@@ -88,43 +90,13 @@ class StandardError(logging.Handler):
         return without_waiting(number, data)
 
 
-class Repeats:
-    """Limit for lines that come again and again, as of a device that is lost and found each second."""
-
-    MOST = 3
-    """So many times within `WITHIN` a line is told."""
-    WITHIN: Seconds = 60.0
-
-    def __init__(self) -> None:
-        self._told: OrderedDict[str, list[Seconds]] = OrderedDict()
-
-    def told(self, text: str, at: Seconds) -> str:
-        """Return what to tell of a line; empty: nothing, it was told often enough. at: by the clock."""
-        times = [each for each in self._told.pop(text, []) if at - each < self.WITHIN]
-        is_told = len(times) < self.MOST
-        self._told[text] = [*times, at] if is_told else times
-        if len(self._told) > LINES:
-            self._told.popitem(last=False)
-        if not is_told:
-            return ""
-        is_last = len(times) + 1 == self.MOST
-        return f"{text} (again and again: told {self.MOST} times a minute)" if is_last else text
-
-
-class LogFile(logging.Handler):
+class LogFile(logging.StreamHandler[Any]):
     """Handler that appends to a file. What cannot be written is lost, and told on standard error."""
 
     def __init__(self, path: Path, tell: Callable[[str], None]) -> None:
         """tell: prints on standard error. Raises OSError if the file cannot be opened."""
-        super().__init__()
         self._file = FileIO(path, "a")
-        self._lines = Patient(f"--log {path}", self._file.write, tell)
-
-    def emit(self, record: logging.LogRecord) -> None:
-        try:
-            self._lines.write(f"{self.format(record)}\n")
-        except Exception:  # a record that is a bug of its writer
-            self.handleError(record)
+        super().__init__(Patient(f"--log {path}", self._file.write, tell))
 
     def close(self) -> None:
         with suppress(OSError):

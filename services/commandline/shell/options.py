@@ -20,7 +20,7 @@ from engage_hri.schemas.utf8 import is_utf8
 if TYPE_CHECKING:
     from engage_hri.services.bus.config import BusConfig
     from engage_hri.services.bus.interface import Hub
-    from engage_hri.services.commandline.shell.config import Config
+    from engage_hri.services.commandline.shell.settings import RobotConfig
     from engage_hri.services.runtime.configuration import Kind
 
 Resolution = Annotated[
@@ -30,7 +30,8 @@ Strict = Annotated[bool, typer.Option("--strict", help="Exit 2 if there was any 
 VirtualTime = Annotated[bool, typer.Option("--virtual-time", help="As fast as it goes, on a clock that jumps.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 WorldFile = Annotated[
-    Path | None, typer.Option("--world", metavar="FILE", help="JSON of the entities; without it the tangram table.")
+    Path | None,
+    typer.Option("--world", metavar="FILE", help="JSON of the entities; without it a table with ten pieces."),
 ]
 
 
@@ -71,20 +72,20 @@ class Configured:
         """Settings that follow from all options, as `key=value`; a later one is stronger."""
         return tuple(self.settings or ())
 
-    def load(self, *, defaults: Iterable[str] = ()) -> "Config":
-        """Read the configuration: the file, and the stronger settings of the options. Raises InputRefused."""
-        from engage_hri.services.commandline.shell.config import Config
+    def load(self) -> "RobotConfig":
+        """Read the configuration of a robot: the file, and the stronger options. Raises InputRefused."""
+        from engage_hri.services.commandline.shell.settings import RobotConfig
 
-        return self.read(Config, defaults=defaults)
+        return self.read(RobotConfig)
 
-    def read(self, kind: "type[Kind]", *, defaults: Iterable[str] = (), elsewhere: Iterable[str] = ()) -> "Kind":
-        """Read a configuration of this kind, without the sections that are `elsewhere`. Raises InputRefused."""
+    def read(self, kind: "type[Kind]", *, defaults: Iterable[str] = ()) -> "Kind":
+        """Read a configuration of this kind. Sections that a robot does without may be there. Raises InputRefused."""
+        from engage_hri.services.commandline.shell.settings import ELSEWHERE
         from engage_hri.services.runtime.configuration import read
 
         return read(
-            kind, self.config, settings=self.overrides, defaults=defaults, elsewhere=frozenset(elsewhere),
-            variables=os.environ,
-        )  # fmt: skip
+            kind, self.config, settings=self.overrides, defaults=defaults, elsewhere=ELSEWHERE, variables=os.environ
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,5 +1,9 @@
-"""Recordings that commands are given: the extra that they need, and what to say of one that is not whole."""
+"""Recordings that commands read and write: the extra that they need, and what to say of one that is not whole."""
 
+import asyncio
+import time
+from collections.abc import AsyncIterator, Mapping, Sequence
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -8,7 +12,10 @@ from engage_hri.services.commandline.shell.failing_output import complain
 from engage_hri.services.runtime.installation import extra_command
 
 if TYPE_CHECKING:
+    from engage_hri.services.bus.interface import Bus
+    from engage_hri.services.recording.disk import RecordingFile
     from engage_hri.services.recording.reading import Recording
+    from engage_hri.services.recording.service import Recorder
 
 
 def needed() -> None:
@@ -43,3 +50,40 @@ def opened(path: Path) -> "Recording":
     if recording.losses.total:
         complain(f"{path}: {recording.losses.total} messages are missing, as its recorder says")
     return recording
+
+
+@asynccontextmanager
+async def recording(
+    bus: "Bus", path: Path, patterns: Sequence[str], facts: Mapping[str, str], *, overwrite: bool = False
+) -> AsyncIterator[tuple["Recorder", "asyncio.Task[None]"]]:
+    """Record into a file while the body of `async with` runs; at the end say what is in it, and what is not.
+
+    Raises InputRefused: it cannot be written. The task ends by itself only if recording fails.
+    """
+    from engage_hri.services.recording import service
+
+    recorder, file, tap = service.opened(
+        bus, path, time.time_ns(), patterns, facts, overwrite=overwrite, tell=complain
+    )
+    running = asyncio.create_task(service.record(bus, tap, recorder, file), name="recorder")
+    try:
+        yield recorder, running
+    finally:
+        running.cancel()
+        await asyncio.wait([running])
+        _report(recorder, file, recorder.close())
+
+
+def _report(recorder: "Recorder", file: "RecordingFile", is_whole: bool) -> None:
+    """Say what is in the file, and what is not."""
+    lost = recorder.losses
+    if file.is_removed:
+        complain(f"{file.path}: it was removed while it was recorded, and is lost")
+        return
+    complain(f"{file.path}: {recorder.messages - lost.disk} messages, {file.written / 1e6:.1f} MB")
+    if lost.total:
+        complain(f"{file.path}: {lost.total} messages are missing, {lost.disk} of them for want of room on the disk")
+    if not is_whole:
+        complain(
+            f"{file.path}: it has no end; `engage record --repair` makes a copy that has one, once there is room"
+        )

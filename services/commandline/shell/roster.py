@@ -6,22 +6,25 @@ Each is imported only when it is to run, so that a robot never loads the simulat
 from collections.abc import Iterable, Sequence
 from functools import partial
 from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.services.commandline.shell.settings import RobotConfig
+from engage_hri.services.commandline.shell.settings import ELSEWHERE, RobotConfig
+from engage_hri.services.runtime.installation import extra_command
+from engage_hri.services.runtime.offers import SERVICES, offers
 from engage_hri.services.runtime.service import Service
 
-NAMES = ("generation", "realizer", "recognition", "control", "simulation", "collaboration")
+if TYPE_CHECKING:
+    from engage_hri.services.commandline.shell.config import Config
+
+ROBOT: tuple[str, ...] = keys.SERVICES
+"""Services of a robot; the others play the person, the table and the task. An installed package offers those."""
 TASK = "collaboration"
 """Service that ends by itself, with the task."""
-ROBOT: tuple[str, ...] = keys.SERVICES
-"""Services of a robot; the others play the person, the table and the task."""
-FUNCTIONS = {
-    "generation": "generate", "realizer": "realize", "recognition": "recognize", "control": "embody",
-    "simulation": "simulate", "collaboration": "collaborate",
-}  # fmt: skip
-"""Coroutine function in the `service.py` of each service."""
+NAMES = ("generation", "realizer", "recognition", "control", *ELSEWHERE)
+FUNCTIONS = {"generation": "generate", "realizer": "realize", "recognition": "recognize", "control": "embody"}
+"""Coroutine function in the `service.py` of each service of a robot."""
 
 Groups = Sequence[tuple[str, ...]]
 """Names of the services of each process."""
@@ -60,6 +63,40 @@ def service(name: str, config: RobotConfig, **more: object) -> Service:
     more: further arguments of that function.
     """
     [name] = group(name)
-    module = import_module(f"engage_hri.services.{name}.service")
+    function = (
+        getattr(import_module(f"engage_hri.services.{name}.service"), FUNCTIONS[name])
+        if name in ROBOT
+        else _offered(name)
+    )
     shared = {"covered_for": config.covered_for} if name in ("generation", "control") else {}
-    return partial(getattr(module, FUNCTIONS[name]), config=getattr(config, name), **shared, **more)
+    return partial(function, config=getattr(config, name), **shared, **more)
+
+
+def _offered(name: str) -> Any:
+    """Coroutine function of a service that a package offers. Raises InputRefused if none does."""
+    for offer in offers(SERVICES):
+        if offer.name == name:
+            return offer.load()
+    raise InputRefused(
+        Fault(reason="no package that is installed offers it", where=name, advice=extra_command("tangram"))
+    )
+
+
+def complete() -> "type[Config]":
+    """Configuration of a robot and of those who stand in for people and the task.
+
+    Raises InputRefused if these are not installed.
+    """
+    try:
+        from engage_hri.services.commandline.shell.config import Config
+    except ModuleNotFoundError as error:
+        raise InputRefused(Fault(reason="the tangram is not installed", advice=extra_command("tangram"))) from error
+    return Config
+
+
+def widest() -> type[RobotConfig]:
+    """Configuration of all services that are installed."""
+    try:
+        return complete()
+    except InputRefused:
+        return RobotConfig

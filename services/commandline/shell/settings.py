@@ -13,6 +13,9 @@ from engage_hri.services.recognition.config import RecognitionConfig
 
 ELSEWHERE = ("simulation", "collaboration")
 """Sections of the same file that a robot ignores: it loads nothing of the simulation and the task."""
+TRANSCRIPT = ("recognition.gaze_resolution=table",)
+"""Settings for the transcript of the tangram: its annotators saw that a look went to the table, but rarely to which
+piece."""
 
 
 class RobotConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -53,16 +53,16 @@ def read_source(path: Path) -> InputFile:
 
 
 def read_world(path: Path | None) -> World:
-    """Read a world from a JSON file; the tangram table without one. Raises InputRefused with the JSON path.
+    """Read a world from a JSON file; a table with ten pieces without one. Raises InputRefused with the JSON path.
 
-    A file without people gets the person of the tangram table, so that there is somebody to speak to.
+    A file without people gets the person of that table, so that there is somebody to speak to.
     """
-    from engage_hri.services.simulation.still import load_world, tangram_world
+    from engage_hri.services.simulation.still import load_world, table_world
 
     if path is None:
-        return tangram_world()
+        return table_world()
     world = load_world(path)
-    return world if world.people else World(entities=(*world.entities, *tangram_world().people))
+    return world if world.people else World(entities=(*world.entities, *table_world().people))
 
 
 def still(world: World, *, is_attentive: bool = False) -> Service:

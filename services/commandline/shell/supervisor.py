@@ -28,6 +28,10 @@ PATIENCE: Seconds = 5.0
 """Time from SIGTERM to SIGKILL."""
 
 
+LONGEST = 2**17
+"""Bytes of a line that is passed on: a key in Zenoh's log has up to 2**16."""
+
+
 def pause_after(previous: Seconds | None, lived: Seconds) -> Seconds:
     """Pause before the next start. previous: the pause before that, None at the first crash."""
     if previous is None or lived >= STABLE:
@@ -53,7 +57,7 @@ def without_threads() -> Iterator[None]:
 
 @asynccontextmanager
 async def spawned(
-    end: Callable[[Process], Awaitable[None]],
+    end: Callable[[Process], Awaitable[object]],
     *arguments: str,
     limit: int = 2**16,
     stderr: int | None = None,
@@ -76,13 +80,32 @@ async def spawned(
         await _uncancelled(_ended(creating, end))
 
 
-async def _ended(creating: "asyncio.Future[Process]", end: Callable[[Process], Awaitable[None]]) -> None:
+async def _ended(creating: "asyncio.Future[Process]", end: Callable[[Process], Awaitable[object]]) -> None:
     process = await creating
     await end(process)
     # asyncio closes its own part with the last pipe; it complains if the loop is closed before.
     assert process.stdin is not None
     assert process.stdout is not None
     process.stdin.close()
+    await _drained(process)
+
+
+async def each_line(stream: asyncio.StreamReader, take: Callable[[bytes], None]) -> None:
+    """Take each line of a stream, in pieces: whoever waits for each line of a flood holds up who writes it."""
+    rest = b""
+    while piece := await stream.read(LONGEST):
+        *lines, rest = (rest + piece).split(b"\n")
+        if len(rest) > LONGEST:
+            lines.append(rest)
+            rest = b""
+        for line in lines:
+            take(line if len(line) <= LONGEST else b"(a line too long to show)")
+    if rest:
+        take(rest)
+
+
+async def _drained(process: Process) -> None:
+    assert process.stdout is not None
     while await process.stdout.read(2**16):
         pass
 
@@ -108,7 +131,7 @@ async def killed(process: Process) -> None:
     await process.wait()
 
 
-async def ended_in_order(process: Process, read: Callable[[Process], Awaitable[None]]) -> bool:
+async def ended_in_order(process: Process, read: Callable[[Process], Awaitable[None]] = _drained) -> bool:
     """End a process, if it still runs: by SIGTERM, and by SIGKILL after `PATIENCE`. Returns False if it was killed.
 
     read: reads its output to the end, so that it is not kept from ending by a full pipe.
@@ -171,8 +194,7 @@ class Child:
 
     async def _pass_on(self, process: Process) -> None:
         assert process.stdout is not None
-        while line := await _line(process.stdout):
-            self._tell(self.name, line.decode(errors="replace").rstrip())
+        await each_line(process.stdout, lambda line: self._tell(self.name, line.decode(errors="replace").rstrip()))
 
     async def _end(self, process: Process) -> None:
         if not await ended_in_order(process, self._pass_on):
@@ -184,13 +206,6 @@ class ChildRefused(RunFailed):
 
     def __init__(self, name: str) -> None:
         super().__init__(Fault(reason=f"{name} could not start", advice="its own message above says why"))
-
-
-async def _line(stream: asyncio.StreamReader) -> bytes:
-    try:
-        return await stream.readline()
-    except ValueError:
-        return b"(a line too long to show)\n"
 
 
 def ending(code: int) -> str:

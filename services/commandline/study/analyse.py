@@ -1,7 +1,5 @@
 """Command `engage analyse`: recorded sessions in the tables of `engage simulate`."""
 
-import csv
-import io
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,15 +9,14 @@ from typing import Annotated
 import typer
 
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.options import Quiet
 from engage_hri.services.commandline.shell.outputs import Terminal
 from engage_hri.services.commandline.shell.process import DONE
 from engage_hri.services.commandline.shell.recording_file import opened
-from engage_hri.services.commandline.shell.result_folder import Folder
+from engage_hri.services.commandline.shell.roster import widest
 from engage_hri.services.commandline.study.again import play_again
-from engage_hri.services.commandline.study.analysing import Session, sessions
-from engage_hri.services.commandline.study.simulate import PLOTS, plotting, rendered
+from engage_hri.services.commandline.study.recorded_sessions import Session, sessions
+from engage_hri.services.commandline.study.tables import StudyReport
 from engage_hri.services.recording.conditions import UNNAMED
 from engage_hri.services.recording.settings import COLUMNS, changed, flat, rows
 from engage_hri.services.runtime.settings import shown
@@ -27,8 +24,6 @@ from engage_hri.services.study import files, summary
 from engage_hri.services.study.conditions import BASELINE
 from engage_hri.services.study.hypotheses import HypothesisResult, findings
 from engage_hri.services.study.summary import BETWEEN, WITHIN, NumberTable
-
-FILES = ("recordings.csv", "settings.csv", "events.csv", "sessions.csv", "hypotheses.csv", "summary.md", *PLOTS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,24 +59,12 @@ def main(options: Options) -> int:
         return play_again(paths, options.settings or (), console)
     if options.settings:
         raise InputRefused(Fault(reason="is for --again: all else is as it was recorded", where="--set"))
-    draw = plotting() if options.out is not None else None
-    folder = Folder(options.out, FILES, overwrite=options.overwrite) if options.out is not None else None
+    report = StudyReport(console, options.out, ("recordings.csv", "settings.csv"), overwrite=options.overwrite)
     played, is_within = numbered([one for path in paths for one in sessions(opened(path))])
     compared, tables = compare(played, options.baseline, is_within=is_within)
-    tables.append(configured(played))
-    for table in tables:
-        console.print("", rendered(table), sep="\n")
-    if folder is not None and draw is not None:
-        records, events = [one.record for one in played], [event for one in played for event in one.events]
-        texts = {
-            "recordings.csv": listed(played), "settings.csv": settings(played),
-            "events.csv": files.events(events),
-            "sessions.csv": files.sessions(records), "summary.md": "\n".join(table.markdown() for table in tables),
-        }  # fmt: skip
-        if compared:
-            texts["hypotheses.csv"] = files.findings(compared)
-        folder.write({name: text.encode() for name, text in texts.items()} | draw(records, events))
-        console.print(f"\nresults in {options.out}", markup=False, highlight=False, soft_wrap=True)
+    records, events = [one.record for one in played], [event for one in played for event in one.events]
+    more = {"recordings.csv": listed(played), "settings.csv": settings(played)}
+    report.end(records, events, compared, [*tables, configured(played)], more)
     return DONE
 
 
@@ -163,7 +146,7 @@ def overview(sessions: Sequence[Session], baseline: str) -> NumberTable:
 
 def configured(sessions: Sequence[Session]) -> NumberTable:
     """Table with the settings of the services that are not as by default, and those of later lives that changed."""
-    by_default = dict(flat(shown(Config())))
+    by_default = dict(flat(shown(widest()())))
     found: list[tuple[str, ...]] = []
     notes = []
     for one in {one.path: one for one in sessions}.values():
@@ -188,20 +171,13 @@ def configured(sessions: Sequence[Session]) -> NumberTable:
 
 def settings(sessions: Sequence[Session]) -> str:
     """CSV of all settings of all services of all recordings."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("session", "condition", *COLUMNS))
-    for one in sessions:
-        writer.writerows((one.record.session, one.condition, *row) for row in rows(one.settings))
-    return text.getvalue()
+    found = ((one.record.session, one.condition, *row) for one in sessions for row in rows(one.settings))
+    return files.table(("session", "condition", *COLUMNS), found)
 
 
 def listed(sessions: Sequence[Session]) -> str:
     """CSV of the recordings: what `session` in the other files stands for."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("session", "condition", "file", "participant", "doubts"))
-    writer.writerows(
+    found = (
         (one.record.session, one.condition, one.path.name, one.participant, "; ".join(one.doubts)) for one in sessions
     )
-    return text.getvalue()
+    return files.table(("session", "condition", "file", "participant", "doubts"), found)

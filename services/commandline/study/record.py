@@ -3,8 +3,6 @@
 import asyncio
 import os
 import time
-from collections.abc import AsyncIterator, Mapping, Sequence
-from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -17,14 +15,12 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.commandline.shell.failing_output import complain
 from engage_hri.services.commandline.shell.options import Connected
 from engage_hri.services.commandline.shell.process import DONE, FAILED, run_until_signal, unique_name
-from engage_hri.services.commandline.shell.recording_file import needed
-from engage_hri.services.commandline.shell.settings import ELSEWHERE, RobotConfig
+from engage_hri.services.commandline.shell.recording_file import needed, recording
+from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.runtime.service import installed_version
 
 if TYPE_CHECKING:
-    from engage_hri.services.bus.interface import Bus
-    from engage_hri.services.recording.disk import RecordingFile
-    from engage_hri.services.recording.service import Recorder
+    pass
 
 GIVES_WAY = 10
 """Niceness of the recorder: where processors are few the robot goes first, and messages wait in front of it."""
@@ -53,7 +49,7 @@ def main(options: Options) -> int:
     needed()
     if options.repair:
         return _repair(options.file)
-    config = options.read(RobotConfig, elsewhere=ELSEWHERE)
+    config = options.load()
     os.nice(GIVES_WAY)
     path = options.file or Path(f"{config.bus.robot}-{time.strftime('%Y%m%d-%H%M%S')}.mcap")
     return run_until_signal(_record(options, config, path))
@@ -95,41 +91,6 @@ async def _record(options: Options, config: RobotConfig, path: Path) -> int:
             except (TimeoutError, asyncio.CancelledError):
                 pass  # Ctrl-C is how a recording ends: the exit code says what became of it
     return DONE if recorder.is_whole and not recorder.losses.disk else FAILED
-
-
-@asynccontextmanager
-async def recording(
-    bus: "Bus", path: Path, patterns: Sequence[str], facts: Mapping[str, str], *, overwrite: bool = False
-) -> AsyncIterator[tuple["Recorder", "asyncio.Task[None]"]]:
-    """Record into a file while the body of `async with` runs; at the end say what is in it, and what is not.
-
-    Raises InputRefused: it cannot be written. The task ends by itself only if recording fails.
-    """
-    from engage_hri.services.recording.service import opened, record
-
-    recorder, file, tap = opened(bus, path, time.time_ns(), patterns, facts, overwrite=overwrite, tell=complain)
-    running = asyncio.create_task(record(bus, tap, recorder, file), name="recorder")
-    try:
-        yield recorder, running
-    finally:
-        running.cancel()
-        await asyncio.wait([running])
-        _report(recorder, file, recorder.close())
-
-
-def _report(recorder: "Recorder", file: "RecordingFile", is_whole: bool) -> None:
-    """Say what is in the file, and what is not."""
-    lost = recorder.losses
-    if file.is_removed:
-        complain(f"{file.path}: it was removed while it was recorded, and is lost")
-        return
-    complain(f"{file.path}: {recorder.messages - lost.disk} messages, {file.written / 1e6:.1f} MB")
-    if lost.total:
-        complain(f"{file.path}: {lost.total} messages are missing, {lost.disk} of them for want of room on the disk")
-    if not is_whole:
-        complain(
-            f"{file.path}: it has no end; `engage record --repair` makes a copy that has one, once there is room"
-        )
 
 
 def _facts(options: Options) -> dict[str, str]:

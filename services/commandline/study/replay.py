@@ -17,7 +17,7 @@ from engage_hri.services.commandline.shell.failing_output import complain
 from engage_hri.services.commandline.shell.options import Listening
 from engage_hri.services.commandline.shell.process import DONE, run_until_signal, typed
 from engage_hri.services.commandline.shell.recording_file import opened
-from engage_hri.services.commandline.shell.settings import ELSEWHERE, RobotConfig
+from engage_hri.services.commandline.shell.settings import RobotConfig
 
 if TYPE_CHECKING:
     from engage_hri.services.bus.interface import Hub
@@ -51,7 +51,7 @@ def main(options: Options) -> int:
     if options.at > recording.duration:
         raise InputRefused(Fault(reason=f"the recording ends after {recording.duration:.2f} s", where="--at"))
     options = options if options.robot else replace(options, robot=recording.robot)
-    config = options.read(RobotConfig, elsewhere=ELSEWHERE)
+    config = options.load()
     if config.bus.keys:
         reason = "a replay says what all services of a robot say, which no keys allow to one holder"
         raise InputRefused(Fault(reason=reason, where="--keys", advice="replay on a bus without keys"))

@@ -13,9 +13,9 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.commandline.embedding import play_tangram
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.process import DONE
-from engage_hri.services.commandline.study.tangram import play_tangram
 from engage_hri.services.runtime.virtual_time import run_virtual
 from engage_hri.services.study.records import EventRecord, SessionRecord, SessionRecorder
 

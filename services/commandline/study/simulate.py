@@ -3,7 +3,7 @@
 import os
 import platform
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -12,10 +12,6 @@ import msgspec
 import numpy as np
 import typer
 from msgspec import Struct
-from rich import box
-from rich.console import Group, RenderableType
-from rich.table import Table as RichTable
-from rich.text import Text
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
@@ -23,17 +19,15 @@ from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.options import Configured, Quiet, Resolution, simulation_settings
 from engage_hri.services.commandline.shell.outputs import Terminal
 from engage_hri.services.commandline.shell.process import DONE, FAILED, interrupted, run
-from engage_hri.services.commandline.shell.result_folder import Folder
-from engage_hri.services.commandline.study.progress import ProgressReport
+from engage_hri.services.commandline.shell.settings import TRANSCRIPT
 from engage_hri.services.commandline.study.session import Order, SessionResult
-from engage_hri.services.commandline.study.tangram import DEFAULTS
+from engage_hri.services.commandline.study.tables import StudyReport, session_line
 from engage_hri.services.commandline.study.workers import play_all
-from engage_hri.services.runtime.installation import extra_command
 from engage_hri.services.runtime.service import installed_version
-from engage_hri.services.study import files, summary
+from engage_hri.services.study import summary
 from engage_hri.services.study.conditions import CONDITIONS, DEGRADATIONS
 from engage_hri.services.study.hypotheses import HypothesisResult, findings
-from engage_hri.services.study.records import EventRecord, SessionRecord
+from engage_hri.services.study.records import SessionRecord
 from engage_hri.services.study.summary import NumberTable
 
 BY_WORDS = ("collaboration.mode=task",)
@@ -47,10 +41,6 @@ DECIDED = {
     "generation.condition": "--condition",
 }
 """Keys that are set for each session, with the option for each."""
-PLOTS = ("events.png", "delays.png", "failure_rates.png", "mtbce.png", "completion_time.png")
-FILES = ("study.json", "events.csv", "sessions.csv", "hypotheses.csv", "summary.md", "failures.txt", *PLOTS)
-
-Draw = Callable[[Sequence[SessionRecord], Sequence[EventRecord]], dict[str, bytes]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,46 +72,31 @@ class Options(Configured):
 
 
 def main(options: Options) -> int:
-    draw = plotting()
     orders = orders_of(options)
-    folder = Folder(options.out, FILES, overwrite=options.overwrite)
     console = Terminal(quiet=options.quiet)
+    report = StudyReport(console, options.out, ("study.json", "failures.txt"), overwrite=options.overwrite)
     played: list[SessionResult] = []
     is_broken_off = False
-    with ProgressReport(console, len(orders)) as report:
 
-        def tell(one: SessionResult) -> None:
-            played.append(one)
-            report(one.record)
+    def tell(one: SessionResult) -> None:
+        played.append(one)
+        console.print(f"{len(played)} of {len(orders)}: {session_line(one.record)}", highlight=False, soft_wrap=True)
 
-        try:
-            run(play_all(orders, options.jobs or os.cpu_count() or 1, tell))
-        except KeyboardInterrupt:
-            is_broken_off = True
+    try:
+        run(play_all(orders, options.jobs or os.cpu_count() or 1, tell))
+    except KeyboardInterrupt:
+        is_broken_off = True
     if played:
         place = {(order.condition, order.session): number for number, order in enumerate(orders)}
         played.sort(key=lambda one: place[one.record.condition, one.record.session])
         records = [one.record for one in played]
         found = findings(records)
         ordered = Counter(order.condition for order in orders)
-        tables = tables_of(records, found, ordered)
-        folder.write(contents(options, orders, played, found, tables, draw))
-        for table in tables:
-            console.print("", rendered(table), sep="\n")
-        console.print(f"\nresults in {options.out}", markup=False, highlight=False, soft_wrap=True)
+        events = [event for one in played for event in one.events]
+        report.end(records, events, found, tables_of(records, found, ordered), texts_of(options, orders, played))
     if is_broken_off:
         return interrupted()
     return DONE if all(one.record.finished for one in played) else FAILED
-
-
-def plotting() -> Draw:
-    """Import the function that draws. Raises InputRefused without matplotlib, before any session is played."""
-    try:
-        from engage_hri.services.study.plots import draw
-    except ImportError as error:
-        fault = Fault(reason=f"plots need matplotlib: {error}", advice=extra_command("study"))
-        raise InputRefused(fault) from error
-    return draw
 
 
 # -- what to play -----------------------------------------------------------------------------------------------
@@ -144,11 +119,11 @@ def orders_of(options: Options) -> list[Order]:
 def _order(options: Options, condition: str, number: int) -> Order:
     """Make one order. The user's settings override what makes a condition worse, but not seed and condition."""
     seed = options.seed + number
-    defaults = [*USUAL.get(options.human, DEFAULTS), *DEGRADATIONS[condition]]
+    defaults = [*USUAL.get(options.human, TRANSCRIPT), *DEGRADATIONS[condition]]
     chosen = [
         *simulation_settings(seed, options.human, options.resolution), f"generation.condition={condition}",
     ]  # fmt: skip
-    config = replace(options, settings=[*options.overrides, *chosen]).load(defaults=defaults)
+    config = replace(options, settings=[*options.overrides, *chosen]).read(Config, defaults=defaults)
     return Order(session=number, condition=condition, seed=seed, limit=options.limit, config=config)
 
 
@@ -167,30 +142,15 @@ def tables_of(
     return tables
 
 
-def contents(
-    options: Options,
-    orders: Sequence[Order],
-    played: Sequence[SessionResult],
-    found: Sequence[HypothesisResult],
-    tables: Sequence[NumberTable],
-    draw: Draw,
-) -> dict[str, bytes]:
-    """Results by file name. Nothing in them depends on the number of processes."""
-    records = [one.record for one in played]
-    events = [event for one in played for event in one.events]
-    texts = {
-        "events.csv": files.events(events),
-        "sessions.csv": files.sessions(records),
-        "summary.md": "\n".join(table.markdown() for table in tables),
-        "study.json": msgspec.json.format(msgspec.json.encode(_study(options, orders, len(played)))).decode() + "\n",
-    }
-    if found:
-        texts["hypotheses.csv"] = files.findings(found)
-    if failed := [one for one in played if one.trace]:
-        texts["failures.txt"] = "\n".join(
-            f"{one.record.condition} {one.record.session}, seed {one.record.seed}\n{one.trace}" for one in failed
-        )
-    return {name: text.encode() for name, text in texts.items()} | draw(records, events)
+def texts_of(options: Options, orders: Sequence[Order], played: Sequence[SessionResult]) -> dict[str, str]:
+    """Files that only simulated sessions have. Nothing in them depends on the number of processes."""
+    told = msgspec.json.format(msgspec.json.encode(_study(options, orders, len(played)))).decode() + "\n"
+    failed = [
+        f"{one.record.condition} {one.record.session}, seed {one.record.seed}\n{one.trace}"
+        for one in played
+        if one.trace
+    ]
+    return {"study.json": told, **({"failures.txt": "\n".join(failed)} if failed else {})}
 
 
 class Study(Struct, frozen=True, kw_only=True):
@@ -220,18 +180,3 @@ def _study(options: Options, orders: Sequence[Order], played: int) -> Study:
         limit=options.limit, ordered=len(orders), played=played, settings=options.overrides,
         configurations=first,
     )  # fmt: skip
-
-
-def rendered(table: NumberTable) -> RenderableType:
-    """Draw a table with its notes, for a terminal."""
-    return Group(grid(table), *(Text(note, style="dim") for note in table.notes))
-
-
-def grid(table: NumberTable) -> RichTable:
-    """Draw a table without its notes."""
-    made = RichTable(title=table.title, title_justify="left", box=box.HORIZONTALS, show_edge=False, padding=0)
-    for index, column in enumerate(table.columns):
-        made.add_column(column, justify="right" if index else "left", overflow="fold")
-    for row in table.rows:
-        made.add_row(*map(Text, row))
-    return made

@@ -9,7 +9,7 @@ from engage_hri.schemas.body import Estimate, EstimateItem
 from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
 from engage_hri.schemas.world import World
-from engage_hri.services.commandline.shell.config import Config
+from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.commandline.shell.sources import Thing
 from engage_hri.services.generation.block.emission import FragmentPlan
 from engage_hri.services.runtime.virtual_time import run_virtual
@@ -24,7 +24,7 @@ class Unplanned(RunFailed):
         self.choices = choices
 
 
-def generated(things: Sequence[Thing], world: World, config: Config, source: str) -> list[FragmentPlan]:
+def generated(things: Sequence[Thing], world: World, config: RobotConfig, source: str) -> list[FragmentPlan]:
     """Plan fragments one after the other, with the configured body at home before each. A block is its own plan.
 
     Raises InputRefused or Unplanned, as performing them would.
@@ -32,7 +32,7 @@ def generated(things: Sequence[Thing], world: World, config: Config, source: str
     return run_virtual(_generated(things, world, config, source))
 
 
-async def _generated(things: Sequence[Thing], world: World, config: Config, source: str) -> list[FragmentPlan]:
+async def _generated(things: Sequence[Thing], world: World, config: RobotConfig, source: str) -> list[FragmentPlan]:
     from engage_hri.services.control.bases.drivers import made
     from engage_hri.services.control.contract.calibration import calibrated
     from engage_hri.services.generation.fragment_check import performable

@@ -9,19 +9,20 @@ from typing import Annotated, Literal
 import typer
 
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.world import World
 from engage_hri.services.commandline.embedding import in_memory
 from engage_hri.services.commandline.shell import roster
-from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.exit_codes import readable
 from engage_hri.services.commandline.shell.failing_output import print_format
 from engage_hri.services.commandline.shell.options import Embodied, Strict, WorldFile
 from engage_hri.services.commandline.shell.outputs import Terminal
 from engage_hri.services.commandline.shell.process import DONE, FAILED
+from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.commandline.shell.sources import read_source, read_world, still
 from engage_hri.services.commandline.talk.offline_plan import generated
 from engage_hri.services.commandline.talk.prose import strict_refusal
+from engage_hri.services.commandline.talk.references import show_references
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import NO_SUCH_BLOCK
 from engage_hri.services.runtime.virtual_time import run_virtual
@@ -32,8 +33,13 @@ HIGHEST = 40
 
 @dataclass(frozen=True, kw_only=True)
 class Options(Embodied):
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A BML block (XML or JSON).", show_default=False)]
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A turn fragment or a BML block (XML or JSON).", show_default=False)
+    ]
     format: Annotated[Literal["text", "json", "dot", "pnml"], typer.Option(help="How to print the net.")] = "text"
+    why: Annotated[
+        bool, typer.Option("--why", help="Why each reference is made as it is: all gestures with all phrases.")
+    ] = False
     world: WorldFile = None
     strict: Strict = False
 
@@ -45,6 +51,14 @@ def main(options: Options) -> int:
     config = options.load()
     source = read_source(options.file)
     around = read_world(options.world)
+    if options.why:
+        if options.format not in ("text", "json"):
+            raise InputRefused(Fault(reason="prints text or json", where="--why", advice="leave out --format"))
+        with source.naming_file():
+            warnings = show_references(source, around, config, is_json=options.format == "json")
+        if options.strict and warnings:
+            raise strict_refusal(warnings)
+        return DONE
     writers = {"text": _as_text, "json": export.as_json, "dot": export.as_dot, "pnml": export.as_pnml}
     texts, warnings, code = [], 0, DONE
     with source.naming_file():
@@ -83,7 +97,7 @@ def _as_text(plan: Plan) -> str:
     return "\n".join((export.as_text(plan), *drawing(net, width, HIGHEST), legend(net)))
 
 
-async def rehearsed(block: Block, world: World, config: Config) -> Plan:
+async def rehearsed(block: Block, world: World, config: RobotConfig) -> Plan:
     """Plan a block as a realizer does that has nothing else to perform, with the configured body at home."""
     from engage_hri.services.realizer.together.planning import planned_alone
 

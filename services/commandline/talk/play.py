@@ -19,15 +19,16 @@ from engage_hri.schemas.status import AskStatus
 from engage_hri.schemas.units import A_DAY, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Hub
+from engage_hri.services.client.connection import connect
 from engage_hri.services.client.language_models import summary_of
-from engage_hri.services.client.robot import Robot, connect
+from engage_hri.services.client.robot import Robot
 from engage_hri.services.commandline.embedding import in_memory, services
-from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.exit_codes import readable
 from engage_hri.services.commandline.shell.failing_output import complain
 from engage_hri.services.commandline.shell.options import Connected, Embodied, Strict, VirtualTime, WorldFile, Written
-from engage_hri.services.commandline.shell.outputs import FeedbackFormat, Outputs, Terminal
+from engage_hri.services.commandline.shell.outputs import Outputs, Terminal
 from engage_hri.services.commandline.shell.process import DONE, FAILED, REFUSED, run, unique_name
+from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.commandline.shell.sources import InputFile, Thing, read_world, still
 from engage_hri.services.commandline.talk import input_check
 from engage_hri.services.commandline.talk.play_state import Played
@@ -56,9 +57,6 @@ class Options(Written, Embodied, Connected):
     at: Annotated[
         str | None,
         typer.Option(metavar="S,S,...", help="When to submit each file, seconds; else one after the other."),
-    ] = None
-    feedback_format: Annotated[
-        FeedbackFormat | None, typer.Option(help="Form of the feedback, whatever its file is called.")
     ] = None
     outcomes: Annotated[
         Path | None,
@@ -120,9 +118,7 @@ def main(options: Options) -> int:
         raise InputRefused(Fault(reason="--connect is for a running system", advice="leave out --embedded"))
     config = options.load()
     times = submission_times(options.at, len(options.files))
-    with Outputs(
-        options.events, options.feedback, format=options.feedback_format, outcomes=options.outcomes
-    ) as outputs:
+    with Outputs(options.events, options.feedback, options.outcomes) as outputs:
         world = read_world(options.world)
         sources = input_check.read_all(options.files, outputs)
         input_check.check(sources, world if options.embedded else None, config.robot, outputs)
@@ -155,7 +151,7 @@ def submission_times(text: str | None, files: int) -> tuple[Seconds, ...] | None
     return times
 
 
-def _private_system(job: Job, config: Config, world: World) -> AbstractAsyncContextManager[Hub]:
+def _private_system(job: Job, config: RobotConfig, world: World) -> AbstractAsyncContextManager[Hub]:
     """Run a private system: simulated body and still world; generation only if there is a fragment.
 
     So without a fragment only the blocks themselves move the head.
@@ -167,12 +163,12 @@ def _private_system(job: Job, config: Config, world: World) -> AbstractAsyncCont
     return in_memory(config, {"simulation": perception, **services(config, *names)})
 
 
-async def _embedded(job: Job, config: Config, world: World) -> int:
+async def _embedded(job: Job, config: RobotConfig, world: World) -> int:
     async with _private_system(job, config, world) as hub:
         return await _perform_all(job, hub, None)
 
 
-async def _remote(job: Job, config: Config) -> int:
+async def _remote(job: Job, config: RobotConfig) -> int:
     async with await job.options.open(config.bus, "manager", patience=PATIENCE) as hub:
         await _somebody_there(hub, job.servers, config)
         async with connect(hub=hub) as robot:
@@ -183,7 +179,7 @@ async def _remote(job: Job, config: Config) -> int:
         return await _perform_all(job, hub, PATIENCE)
 
 
-async def _somebody_there(hub: Hub, servers: frozenset[str], config: Config) -> None:
+async def _somebody_there(hub: Hub, servers: frozenset[str], config: RobotConfig) -> None:
     """Wait for the servers, at most `PATIENCE` for all of them. Raises RunFailed for the first that is missing."""
     from engage_hri.services.bus.zenoh.neighbors import hinting
 

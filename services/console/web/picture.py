@@ -28,8 +28,8 @@ from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.status import Status
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.console import nets, view, wording
-from engage_hri.services.console.web import net_layout, scene
+from engage_hri.services.console import net_layout, nets, view, wording
+from engage_hri.services.console.web import scene
 from engage_hri.services.console.web.health import HealthBoard
 from engage_hri.services.console.web.lanes import BlockLanes, EventLanes
 from engage_hri.services.console.web.looking import plainly

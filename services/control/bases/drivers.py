@@ -2,8 +2,9 @@
 
     body = made(config)             # of `control.body`, `control.voice` and `control.drivers`, inside the event loop
 
-A name is one that an installed package offers (`offers.py`), ours among them; `package.module:Class`, which may lie
-in the current folder; or `FILE.py:Class`. `head,face=NAME` takes only these parts of a driver.
+A name is one that an installed package offers (`services/runtime/offers.py`), ours among them;
+`package.module:Class`, which may lie in the current folder; or `FILE.py:Class`. `head,face=NAME` takes only these
+parts of a driver.
 """
 
 import inspect
@@ -24,14 +25,13 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.explained import explained
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
-from engage_hri.services.control.bases.composed import composed
+from engage_hri.services.control.bases.composed import Member, composed
 from engage_hri.services.control.bases.driver_guard import GuardedBody
 from engage_hri.services.control.bases.error_place import seen_at, words_of
-from engage_hri.services.control.bases.members import Member
-from engage_hri.services.control.bases.offers import BODIES, VOICES, Offer, offers, unreadable
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.body import Body
 from engage_hri.services.runtime.installation import packages_command
+from engage_hri.services.runtime.offers import BODIES, VOICES, Offer, offers, unreadable
 
 FORMS = "NAME, FILE.py:CLASS or package.module:CLASS"
 _OWN = __name__.partition(".")[0]

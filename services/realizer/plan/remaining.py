@@ -12,7 +12,7 @@ from typing import get_args
 from msgspec.structs import replace
 
 from engage_hri.schemas.behavior_types import TYPES
-from engage_hri.schemas.behaviors import UNDECLARED, Event, Head, Unknown
+from engage_hri.schemas.behaviors import Event, Head, Unknown
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
@@ -51,8 +51,6 @@ def events_needing(lost: str, block: Block) -> list[Event]:
 
 def unknown(behavior: Unknown) -> tuple[WarningKind, str]:
     """Kind and reason of the warning about a behavior that nobody here knows, or that does not say what to do."""
-    if behavior.namespace.startswith(UNDECLARED):
-        return "CUSTOM_BEHAVIOR_NOT_SUPPORTED", f"the prefix of <{behavior.element}> is not declared"
     if behavior.namespace:
         return "CUSTOM_BEHAVIOR_NOT_SUPPORTED", f"<{behavior.element}> is of namespace {behavior.namespace!r}"
     if behavior.lacks:

@@ -12,7 +12,7 @@ from engage_hri.services.commandline.shell.sources import still
 from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.service import embody
 from engage_hri.services.runtime.service import Ready, Service
-from engage_hri.services.simulation.still import tangram_world
+from engage_hri.services.simulation.still import table_world
 from tests.rigs.hostile.trial import KINDS, Attack, Client, Kind, Report, run
 
 BodyMaker = Callable[[], Body]
@@ -42,7 +42,7 @@ def whole_robot(config: Config | None = None, body: BodyMaker | None = None) -> 
     robot = services(config, *roster.ROBOT)
     if body is not None:
         robot["control"] = partial(_embody, config=config, make=body)
-    return {"simulation": still(tangram_world()), **robot}
+    return {"simulation": still(table_world()), **robot}
 
 
 async def _embody(bus: Bus, ready: Ready, config: Config, make: BodyMaker) -> None:

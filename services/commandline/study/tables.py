@@ -1,0 +1,90 @@
+"""Tables and plots of a study, for a terminal and for files."""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from pathlib import Path
+
+from rich import box
+from rich.console import Console, Group, RenderableType
+from rich.table import Table as RichTable
+from rich.text import Text
+
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.services.commandline.shell.result_folder import Folder
+from engage_hri.services.runtime.installation import extra_command
+from engage_hri.services.study import files
+from engage_hri.services.study.hypotheses import HypothesisResult
+from engage_hri.services.study.records import EventRecord, SessionRecord
+from engage_hri.services.study.summary import NumberTable
+
+PLOTS = ("events.png", "delays.png", "failure_rates.png", "mtbce.png", "completion_time.png")
+FILES = ("events.csv", "sessions.csv", "hypotheses.csv", "summary.md", *PLOTS)
+Draw = Callable[[Sequence[SessionRecord], Sequence[EventRecord]], dict[str, bytes]]
+
+
+class StudyReport:
+    """End of a study: its tables on the terminal, and in a folder the same tables, all numbers, and plots.
+
+    out: the folder; None: the tables are only printed. more: names of further files in it. Raises InputRefused if the
+    folder cannot be had, or there is no matplotlib for the plots: before anything is played.
+    """
+
+    def __init__(self, console: Console, out: Path | None, more: Collection[str], *, overwrite: bool) -> None:
+        self._console = console
+        self._folder = None
+        if out is not None:
+            self._draw = _plotting()
+            self._folder = Folder(out, (*FILES, *more), overwrite=overwrite)
+
+    def end(
+        self,
+        records: Sequence[SessionRecord],
+        events: Sequence[EventRecord],
+        found: Sequence[HypothesisResult],
+        tables: Sequence[NumberTable],
+        more: Mapping[str, str],
+    ) -> None:
+        """Print and write all of it. more: texts of the further files, as far as there are some."""
+        for table in tables:
+            self._console.print("", rendered(table), sep="\n")
+        if self._folder is None:
+            return
+        texts = {
+            **more, "events.csv": files.events(events), "sessions.csv": files.sessions(records),
+            "summary.md": "\n".join(table.markdown() for table in tables),
+            **({"hypotheses.csv": files.findings(found)} if found else {}),
+        }  # fmt: skip
+        written = {name: text.encode() for name, text in texts.items()}
+        self._folder.write(written | self._draw(records, events))
+        self._console.print(f"\nresults in {self._folder.path}", markup=False, highlight=False, soft_wrap=True)
+
+
+def _plotting() -> Draw:
+    """Import the function that draws. Raises InputRefused without matplotlib."""
+    try:
+        from engage_hri.services.study.plots import draw
+    except ImportError as error:
+        fault = Fault(reason=f"plots need matplotlib: {error}", advice=extra_command("study"))
+        raise InputRefused(fault) from error
+    return draw
+
+
+def rendered(table: NumberTable) -> RenderableType:
+    """Draw a table with its notes, for a terminal."""
+    return Group(grid(table), *(Text(note, style="dim") for note in table.notes))
+
+
+def grid(table: NumberTable) -> RichTable:
+    """Draw a table without its notes."""
+    made = RichTable(title=table.title, title_justify="left", box=box.HORIZONTALS, show_edge=False, padding=0)
+    for index, column in enumerate(table.columns):
+        made.add_column(column, justify="right" if index else "left", overflow="fold")
+    for row in table.rows:
+        made.add_row(*map(Text, row))
+    return made
+
+
+def session_line(record: SessionRecord) -> str:
+    """Result of a session: `operational 3: 155 s, 97 connection events`."""
+    came_to = f"{record.duration:.0f} s, {record.statistics.events} connection events"
+    name = f"{record.condition} {record.session}"
+    return f"{name}: {came_to}" if record.finished else f"{name}: not finished: {record.reason} ({came_to})"

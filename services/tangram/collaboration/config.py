@@ -1,0 +1,19 @@
+"""Configuration of the collaboration manager: how it plays the tangram."""
+
+from typing import Literal
+
+from msgspec import Struct
+
+from engage_hri.schemas.ranges import not_negative
+from engage_hri.schemas.units import Seconds
+
+
+class CollaborationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The section `collaboration`. mode: `scripted` plays Appendix B; `task` chooses pieces and words itself."""
+
+    mode: Literal["scripted", "task"] = "scripted"
+    placement: Seconds = 15.0
+    """Time that the person has to place a piece before the robot asks again."""
+
+    def __post_init__(self) -> None:
+        not_negative(self, ("placement",), "collaboration.")

@@ -1,0 +1,116 @@
+"""Places of the pieces, judged from many frames: a single one may be wrong, and hands cover pieces (thesis 5.4.2).
+
+Pure. The place of a piece is the median, over the last second, of where it was seen while it rested and no hand was
+over it. A piece that is not in view keeps its last place, with confidence 0.
+"""
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterable
+from itertools import accumulate
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from engage_hri.schemas.units import Meters, Seconds
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.tangram.collaboration.placement import TRUSTED, is_moving
+
+STEADY: Seconds = 0.5
+"""Time that a piece must rest in view, with no hand over it, before its place is believed. Ours."""
+HAND_OVER: Meters = 0.08
+"""Distance of their centers, seen from above, below which a hand covers a piece: half a hand and half a piece."""
+WINDOW: Seconds = 1.0
+"""Age of the oldest frame that is judged."""
+
+
+class _View(Struct):
+    """A piece in view without interruption. samples: what was seen from which time on, each until the next."""
+
+    since: Seconds
+    samples: deque[tuple[Seconds, Entity]]
+
+    def add(self, piece: Entity, now: Seconds) -> None:
+        self.samples.append((now, piece))
+        while len(self.samples) > 1 and self.samples[1][0] <= now - WINDOW:
+            self.samples.popleft()
+
+    def median(self, now: Seconds) -> Entity:
+        """The piece at the median of where it was seen in the window, coordinate by coordinate, weighted by time."""
+        pieces = [piece for _, piece in self.samples]
+        last = pieces[-1]
+        times = [max(at, now - WINDOW) for at, _ in self.samples]
+        held = [end - at for at, end in zip(times, [*times[1:], now], strict=True)]
+
+        def of(value: Callable[[Entity], float]) -> float:
+            return _median(list(zip(map(value, pieces), held, strict=True)))
+
+        place = (of(lambda it: it.position[0]), of(lambda it: it.position[1]), of(lambda it: it.position[2]))
+        turned = of(lambda it: math.remainder(it.yaw - last.yaw, math.tau))
+        return replace(last, position=place, yaw=last.yaw + turned)
+
+
+class PiecesInView:
+    """The pieces and people seen so far."""
+
+    def __init__(self) -> None:
+        self._views: dict[str, _View] = {}
+        self._known: dict[str, Entity] = {}
+        self._people: dict[str, Seconds] = {}
+        """Time at which each person was last seen."""
+        self._present: tuple[str, ...] = ()
+        self._last: Seconds = -math.inf
+
+    def see(self, world: World, now: Seconds) -> None:
+        """Take in a frame."""
+        self._people |= dict.fromkeys(self._present, now)
+        self._present = tuple(person.id for person in world.people)
+        self._last = now
+        hands = [entity for entity in world.entities if entity.kind == "hand"]
+        in_view = {piece.id: piece for piece in world.objects if _is_clear(piece, hands)}
+        for id in self._views.keys() - in_view.keys():
+            self._known[id] = self._views.pop(id).median(now)
+        for piece in world.objects:
+            self._known.setdefault(piece.id, piece)
+        for id, piece in in_view.items():
+            self._views.setdefault(id, _View(now, deque())).add(piece, now)
+
+    def pieces(self, now: Seconds) -> tuple[Entity, ...]:
+        """Every piece seen so far, at its last known place; with confidence 0 while that is uncertain."""
+        return tuple(
+            self._views[id].median(now) if self._is_steady(id, now) else replace(known, confidence=0.0)
+            for id, known in self._known.items()
+        )
+
+    def is_steady(self, now: Seconds) -> bool:
+        """True if the place of every piece is certain."""
+        return all(self._is_steady(id, now) for id in self._known)
+
+    def person(self, now: Seconds, known: str = "") -> str | None:
+        """Id of a person who is there, or was a moment ago, of `known` rather than of another; None: nobody."""
+        there = [*self._present, *(id for id, at in self._people.items() if now < at + STEADY)]
+        return known if known in there else next(iter(there), None)
+
+    def deadline(self, now: Seconds) -> Seconds | None:
+        """Next time at which any of this changes by itself, without another frame; None: never."""
+        times = [*(view.since + STEADY for view in self._views.values()), self._last + WINDOW / 2]
+        times += [at + STEADY for at in self._people.values()]
+        return min((at for at in times if at > now), default=None)
+
+    def _is_steady(self, id: str, now: Seconds) -> bool:
+        return id in self._views and now >= self._views[id].since + STEADY
+
+
+def _is_clear(piece: Entity, hands: Iterable[Entity]) -> bool:
+    covered = any(math.dist(hand.position[:2], piece.position[:2]) < HAND_OVER for hand in hands)
+    return piece.confidence >= TRUSTED and not covered and not is_moving(piece)
+
+
+def _median(weighted: list[tuple[float, float]]) -> float:
+    """The median of values with weights; the last value if nothing has weight."""
+    half = sum(weight for _, weight in weighted) / 2
+    if half == 0.0:
+        return weighted[-1][0]
+    ordered = sorted(weighted)
+    reached = accumulate(weight for _, weight in ordered)
+    return next(value for (value, _), share in zip(ordered, reached, strict=True) if share >= half)

@@ -1,0 +1,238 @@
+"""Plans of the collaboration manager, as generators: a plan yields a wish, and is sent the answer to it.
+
+Pure: neither bus nor clock. The service grants the wishes; a test plays the robot and the human by hand.
+"""
+
+from collections.abc import Generator, Iterable
+from typing import TypeVar
+
+from msgspec import Struct
+
+from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
+from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.schemas.world import Entity
+from engage_hri.services.tangram.collaboration.config import CollaborationConfig
+from engage_hri.services.tangram.collaboration.fragments import (
+    MANIPULATION,
+    PieceMention,
+    Sentence,
+    fragment,
+    request,
+)
+from engage_hri.services.tangram.collaboration.task import Goal, Instruction, check
+from engage_hri.services.tangram.table import TangramTable
+
+ATTEMPTS = 3
+"""Number of times that the robot asks for one placement before it goes on without. Ours."""
+ARRIVAL: Seconds = 4.0
+"""Time from when a person is seen until the robot greets them, so that they can sit down. Ours."""
+FAREWELL: Seconds = 15.0
+"""Time that the robot waits for the person to leave after its goodbye. Ours."""
+PATIENCE: Seconds = 2.0
+"""Time that the robot waits for a hand to go away before it judges what lies where. Ours."""
+SETTLE: Seconds = 0.75
+"""Time from when a placement is seen until the robot speaks: the person looks up, and the robot looks back. Ours."""
+PAUSE: Seconds = 0.4
+"""Time between two turns of the robot. Ours."""
+THINKING: Seconds = 1.0
+"""Time between "Ummmm," and "good.". Ours."""
+PIECE_RELIABILITY: Probability = 0.95
+"""Least reliability of a reference to the piece to move, and to the trapezoid when introduced. Scenario page."""
+LANDMARK_RELIABILITY: Probability = 0.85
+"""Least reliability of a reference to a landmark, and to the rectangle when introduced. Scenario page."""
+
+# -- what a plan may wish for -----------------------------------------------------------------------------------
+
+
+class Perform(Struct, frozen=True):
+    """Perform the fragment. Answer: its outcome, None if it was refused or failed."""
+
+    fragment: TurnFragment
+
+
+class Observe(Struct, frozen=True):
+    """Look until the place of each piece is certain. Answer: the pieces, with confidence 0 where it is not.
+
+    patience: look at most this long.
+    """
+
+    patience: Seconds
+
+
+class AwaitPlacement(Struct, frozen=True):
+    """Wait until the piece has been moved from where it was `before`, and rests. Answer: True if it has."""
+
+    piece: str
+    before: tuple[Entity, ...]
+    timeout: Seconds
+
+
+class AwaitPerson(Struct, frozen=True):
+    """Wait until a person is there. Answer: an id, that of `known` if this one is there."""
+
+    known: str = ""
+
+
+class AwaitDeparture(Struct, frozen=True):
+    """Wait until nobody is there any more. Answer: True if they have gone."""
+
+    timeout: Seconds
+
+
+class Pause(Struct, frozen=True):
+    seconds: Seconds
+
+
+Wish = Perform | Observe | AwaitPlacement | AwaitPerson | AwaitDeparture | Pause
+Answer = FragmentOutcome | tuple[Entity, ...] | str | bool | None
+R = TypeVar("R")
+Plan = Generator[Wish, Answer, R]
+
+
+# -- parts of plans ---------------------------------------------------------------------------------------------
+
+
+class Manager:
+    """Parts that the scripted plan and the plan of the task have in common."""
+
+    def __init__(self, config: CollaborationConfig, table: TangramTable) -> None:
+        self.config = config
+        self.table = table
+        self.goal = Goal(table)
+        self._universe = tuple(piece.id for piece in table.pieces)
+        self._person = table.person.id
+
+    def welcome(self) -> Plan[None]:
+        """Wait for a person, and let them settle."""
+        self._person = ""
+        yield from self._meet()
+
+    def _meet(self) -> Plan[None]:
+        """Go on with the person; with another one, or the next who comes, if this one has left. They may settle."""
+        person = yield AwaitPerson(self._person)
+        assert isinstance(person, str)
+        if person != self._person:
+            self._person = person
+            yield Pause(ARRIVAL)
+
+    def say(self, id: str, sentence: Sentence, *, look: bool = True) -> Plan[None]:
+        """Say a full turn that asks for nothing."""
+        yield from self._meet()
+        yield Perform(fragment(id, sentence, addressee=self._person, universe=self._universe, look=look))
+        yield Pause(PAUSE)
+
+    def approve(self, id: str) -> Plan[None]:
+        """Say "Ummmm, good.": look away as if thinking, then look back. Steps 20 and 23 of Appendix B."""
+        yield from self._meet()
+        yield Perform(
+            fragment(
+                f"{id}-a", ("Ummmm,",), addressee=self._person, universe=self._universe,
+                status="beginning", delay_target=self.table.surface.id,
+            )
+        )  # fmt: skip
+        yield Pause(THINKING)
+        yield Perform(
+            fragment(f"{id}-b", ("good.",), addressee=self._person, universe=self._universe, status="end", look=False)
+        )
+        yield Pause(PAUSE)
+
+    def instruct(self, id: str, instruction: Instruction) -> Plan[bool]:
+        """Ask for a placement until it is right: again if nothing happens, for a fix if it is wrong.
+
+        Returns True if it was right in the end.
+        """
+        request_id, fix = id, False
+        pieces = yield from self.observe()
+        for attempt in range(1, ATTEMPTS + 1):
+            yield from self._meet()
+            yield Perform(self._request(request_id, instruction, fix=fix))
+            placed = yield AwaitPlacement(instruction.wanted.piece, pieces, self.config.placement)
+            yield Pause(SETTLE)
+            pieces = yield from self.observe()
+            verdict = check(instruction, pieces)
+            if verdict.right:
+                return True
+            fix = placed is True and verdict.seen
+            number = f"-{attempt}" if attempt > 1 else ""
+            request_id = f"{id}-{'fix' if fix else 'again'}{number}"
+        return False
+
+    def observe(self) -> Plan[tuple[Entity, ...]]:
+        """Look at the pieces as they lie."""
+        pieces = yield Observe(PATIENCE)
+        assert isinstance(pieces, tuple)
+        return pieces
+
+    def farewell(self) -> Plan[None]:
+        yield AwaitDeparture(FAREWELL)
+
+    def _request(self, id: str, instruction: Instruction, *, fix: bool = False) -> TurnFragment:
+        sentence = request(
+            instruction.wanted,
+            self.table,
+            verb="fix" if fix else "move",
+            deictic="" if fix else instruction.deictic,
+            piece_reliability=PIECE_RELIABILITY,
+            landmark_reliability=LANDMARK_RELIABILITY,
+        )
+        return fragment(id, sentence, addressee=self._person, universe=self._universe, accept=MANIPULATION)
+
+    def introduction(self) -> tuple[str | PieceMention, ...]:
+        """Sentence that introduces the pieces on the table. Step 3 of Appendix B."""
+        return (
+            "We are going to use the pieces on the table to make a picture together. "
+            "As you can see, on the table we have: squares, triangles,",
+            PieceMention(piece="rectangle", phrase="a rectangle", reliability=LANDMARK_RELIABILITY),
+            "and",
+            PieceMention(piece="trapezoid", phrase="a trapezoid", reliability=PIECE_RELIABILITY),
+            "of different colors.",
+        )
+
+
+# -- whole plans ------------------------------------------------------------------------------------------------
+
+
+class Turn(Struct, frozen=True, kw_only=True):
+    """A row of a script: words to `say`, a placement to ask for, or, with neither, "Ummmm, good."."""
+
+    step: str
+    say: tuple[str | PieceMention, ...] = ()
+    instruction: Instruction | None = None
+    look: bool = True
+
+
+def script(manager: Manager, turns: Iterable[Turn]) -> Plan[None]:
+    """Play a script row by row; a placement that stays wrong does not end it."""
+    yield from manager.welcome()
+    for turn in turns:
+        if turn.instruction is not None:
+            yield from manager.instruct(turn.step, turn.instruction)
+        elif turn.say:
+            yield from manager.say(turn.step, turn.say, look=turn.look)
+        else:
+            yield from manager.approve(turn.step)
+    yield from manager.farewell()
+
+
+def task(manager: Manager) -> Plan[None]:
+    """Make the figure with the person: ask for one piece after the other, each chosen from the table as it is."""
+    yield from manager.welcome()
+    yield from manager.say("hello", ("Hello, let's make a tangram.",))
+    yield from manager.say("pieces", manager.introduction(), look=False)
+    yield from manager.say("start", ("Okay, let's start.",))
+    given_up: set[str] = set()
+    number = 0
+    while True:
+        pieces = yield from manager.observe()
+        instruction = manager.goal.next(pieces, given_up)
+        if instruction is None:
+            break
+        number += 1
+        if (yield from manager.instruct(f"move-{number}", instruction)):
+            yield from manager.approve(f"good-{number}")
+        else:
+            given_up.add(instruction.wanted.piece)
+    finished = "Look, we made an anchor." if not given_up else "Look, we almost made an anchor."
+    yield from manager.say("finished", (finished,), look=False)
+    yield from manager.say("goodbye", ("Thanks for playing. That was fun, goodbye.",), look=False)
+    yield from manager.farewell()

@@ -1,0 +1,99 @@
+"""The collaboration manager of the tangram: performs its plan through the public client alone."""
+
+import asyncio
+import math
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import EngageError
+from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import World
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.client.feeds import Feed
+from engage_hri.services.client.robot import Robot
+from engage_hri.services.runtime.service import Ready
+from engage_hri.services.runtime.settings import tell_settings
+from engage_hri.services.tangram.collaboration import plans
+from engage_hri.services.tangram.collaboration.appendix_b import turns
+from engage_hri.services.tangram.collaboration.config import CollaborationConfig
+from engage_hri.services.tangram.collaboration.pieces_in_view import PiecesInView
+from engage_hri.services.tangram.collaboration.placement import has_been_placed
+from engage_hri.services.tangram.table import tangram_table
+
+
+async def collaborate(bus: Bus, ready: Ready, config: CollaborationConfig) -> None:
+    """Play the tangram once, with the first person who comes, or who comes after them; return after the goodbye."""
+    manager = plans.Manager(config, tangram_table())
+    plan = plans.script(manager, turns(manager)) if config.mode == "scripted" else plans.task(manager)
+    async with Robot.on(bus) as robot, asyncio.TaskGroup() as tasks:
+        engine = _Engine(robot, bus, PiecesInView())
+        with robot.worlds() as worlds:
+            watching = tasks.create_task(engine.watch(worlds), name="watch the table")
+            tell_settings(bus, "collaboration", config)
+            ready()
+            await _follow(plan, engine)
+            watching.cancel()
+
+
+async def _follow(plan: plans.Plan[None], engine: "_Engine") -> None:
+    answer: plans.Answer = None
+    while True:
+        try:
+            wish = plan.send(answer)
+        except StopIteration:
+            return
+        answer = await engine.grant(wish)
+
+
+class _Engine:
+    """Grants the wishes of a plan, and watches the table all the while."""
+
+    def __init__(self, robot: Robot, bus: Bus, view: PiecesInView) -> None:
+        self._robot = robot
+        self._bus = bus
+        self._view = view
+        self._seen = asyncio.Event()
+
+    async def watch(self, worlds: Feed[World]) -> None:
+        async for world in worlds:
+            self._view.see(world, self._robot.now())
+            self._seen.set()
+
+    async def grant(self, wish: plans.Wish) -> plans.Answer:
+        now, view = self._robot.now(), self._view
+        match wish:
+            case plans.Perform(fragment=fragment):
+                try:
+                    return await self._robot.perform(fragment)
+                except EngageError as error:
+                    self._bus.publish(keys.fault(self._bus.name), error.fault)
+                    return None
+            case plans.Observe(patience=patience):
+                await self._wait_until(view.is_steady, now + patience)
+                return view.pieces(self._robot.now())
+            case plans.AwaitPlacement(piece=piece, before=before, timeout=timeout):
+                is_placed = partial(has_been_placed, piece, before)
+                return await self._wait_until(lambda at: is_placed(view.pieces(at)), now + timeout)
+            case plans.AwaitPerson(known=known):
+                await self._wait_until(lambda at: view.person(at) is not None, math.inf)
+                return view.person(self._robot.now(), known)
+            case plans.AwaitDeparture(timeout=timeout):
+                return await self._wait_until(lambda at: view.person(at) is None, now + timeout)
+            case plans.Pause(seconds=seconds):
+                await asyncio.sleep(seconds)
+                return None
+
+    async def _wait_until(self, holds: Callable[[Seconds], bool], deadline: Seconds) -> bool:
+        """Wait until `holds`, asked at loop time, is true of the table. False: it was not by `deadline`."""
+        while not holds(now := self._robot.now()):
+            if now >= deadline:
+                return False
+            change = self._view.deadline(now)
+            again = deadline if change is None else min(change, deadline)
+            self._seen.clear()
+            with suppress(TimeoutError):
+                async with asyncio.timeout_at(again if again < math.inf else None):
+                    await self._seen.wait()
+        return True
