@@ -15,8 +15,8 @@ from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.world import World
 from engage_hri.services.control.voice.clauses import clause
 from engage_hri.services.control.voice.espeak import EspeakSettings, EspeakSynthesizer
-from engage_hri.services.control.voice.phrases import pieces
 from engage_hri.services.control.voice.sounding import EspeakVoice
+from engage_hri.services.control.voice.timeline import pieces
 
 NOUNS = ("triangle", "square", "rectangle", "piece", "picture", "house", "corner")
 WORLD = World(entities=())

@@ -307,10 +307,6 @@ class TurnSignal(Behavior, frozen=True, kw_only=True, tag="turn", omit_defaults=
     """The addressee."""
 
 
-UNDECLARED = "urn:undeclared:"
-"""Begin of the namespace of an element whose prefix is not declared."""
-
-
 class Unknown(Behavior, frozen=True, kw_only=True, tag="unknown", omit_defaults=True):
     """A behavior of a type that is not known here: dropped with a warning; if it is required, the block fails.
 

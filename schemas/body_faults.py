@@ -146,6 +146,16 @@ def flaw(fault: BodyFault, body: Capabilities) -> str:
     return ""
 
 
+def refuse(faults: Iterable[BodyFault], body: Capabilities, where: str = "") -> None:
+    """Raise InputRefused if a body cannot play one of these faults.
+
+    where: place that they come from; empty: the kind of the fault is told.
+    """
+    for fault in faults:
+        if reason := flaw(fault, body):
+            raise InputRefused(Fault(reason=reason, where=where or fault.kind, service="control"))
+
+
 def parts_of(kind: FaultKind, body: Capabilities) -> tuple[str, ...]:
     """Names of the parts and joints of a body that a fault of this kind may concern. The face has no angles."""
     if kind.parts:

@@ -16,7 +16,7 @@ AnyInput = TypeVar("AnyInput", Block, TurnFragment)
 AnyBehavior = TypeVar("AnyBehavior", bound=Behavior)
 
 
-_SYNC_NAMES = frozenset({*SYNC_POINTS, "strokeStart", "strokeEnd", "attackPeak"})
+SYNC_NAMES = frozenset({*SYNC_POINTS, "strokeStart", "strokeEnd", "attackPeak"})
 """Sync points of behaviors in either spelling."""
 
 
@@ -121,7 +121,7 @@ def disambiguated(thing: AnyInput) -> AnyInput:
 
 
 def _with_own_names(behavior: AnyBehavior, marks: frozenset[str]) -> AnyBehavior:
-    own = {*_SYNC_NAMES, *marks}
+    own = {*SYNC_NAMES, *marks}
     timing = tuple([Timing(each.sync, _own(behavior.id, each.ref, own)) for each in behavior.timing])
     return replace(behavior, timing=timing) if timing != behavior.timing else behavior
 

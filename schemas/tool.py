@@ -7,7 +7,6 @@ below and uses only what both APIs constrain sampling by: closed objects, no `$r
 alternatives of a part that differ in their first key.
 """
 
-from collections.abc import Iterator
 from typing import Annotated, Any, Literal, get_args
 
 import msgspec
@@ -133,12 +132,9 @@ class ToolInput(Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_un
 
 Schema = dict[str, Any]
 
-MOST_VALUES = 1000
-"""Values that all lists of a schema may have together, by the documentation of OpenAI's strict functions."""
-MANY, MOST_LETTERS = 250, 15_000
-"""A list of more values than that may have so many letters in all, by the same."""
-MOST_LETTERS_IN_ALL = 120_000
-"""Letters that all lists of a schema and the names of its fields may have together, by the same."""
+MOST_IDS, MOST_LETTERS = 250, 15_000
+"""Ids that a world may have, and letters in these, to be listed: the APIs take 1000 values in all lists of a schema,
+and 15 000 letters in a list of more than 250."""
 
 
 def tool_definition(format: Format = "anthropic", world: World | None = None) -> Schema:
@@ -148,8 +144,8 @@ def tool_definition(format: Format = "anthropic", world: World | None = None) ->
     `"strict": true`.
 
     format: for Anthropic's Messages API, OpenAI's Responses API, or the Chat Completions API of many others.
-    world: only the ids of its objects and people are allowed; None: any. Of a world with more ids than the APIs take
-        as values, some fields take any text (`unlisted` says which), and Engage refuses what is no id.
+    world: only the ids of its objects and people are allowed; None: any. If it has more than the APIs take as values
+        (`is_listed` tells), the fields take any text, and Engage refuses what is no id.
 
     Raises:
         ValueError: there is no such format.
@@ -171,60 +167,23 @@ def input_schema(world: World | None = None) -> Schema:
     whole["properties"]["parts"]["items"] = {"anyOf": parts}
     if world is not None:
         _, refer, look, _ = parts
-        places = {
-            "refer": refer["properties"]["refer"],
-            "look": look["properties"]["look"],
-            "addressee": whole["properties"]["addressee"],
-        }
-        for field, ids in _listed(world, whole).items():
-            if ids:
-                places[field]["enum"] = ids
+        if is_listed(world):
+            people = [person.id for person in world.people]
+            for schema, field, ids in (
+                (whole, "addressee", ["", *people] if people else []),
+                (refer, "refer", [thing.id for thing in world.objects]),
+                (look, "look", [each.id for each in world.entities if each.kind != "hand"]),
+            ):
+                if ids:
+                    schema["properties"][field]["enum"] = ids
         if told := _inventory(world):
-            places["refer"]["description"] += f" There are: {told}."
+            refer["properties"]["refer"]["description"] += f" There are: {told}."
     return whole
 
 
-def unlisted(world: World) -> tuple[str, ...]:
-    """Fields whose ids the tool of this world does not list, since its readers would not take as many."""
-    listed = _listed(world, input_schema())
-    return tuple(field for field, ids in _ids(world).items() if ids and not listed[field])
-
-
-def _ids(world: World) -> dict[str, list[str]]:
-    """Ids of each field that takes some, the most useful list first."""
-    people = [person.id for person in world.people]
-    return {
-        "addressee": ["", *people] if people else [],
-        "refer": [thing.id for thing in world.objects],
-        "look": [each.id for each in world.entities if each.kind != "hand"],
-    }
-
-
-def _listed(world: World, schema: Schema) -> dict[str, list[str]]:
-    """Ids of each field as far as they fit, whole lists only: an id that a list lacks could not be written at all.
-
-    schema: without ids. All of its letters count, which is some thousand more than is asked for.
-    """
-    left, letters_left = MOST_VALUES - sum(map(len, _lists(schema))), MOST_LETTERS_IN_ALL - len(str(schema))
-    listed = {}
-    for field, ids in _ids(world).items():
-        letters = sum(map(len, ids))
-        fits = len(ids) <= left and letters <= letters_left and (len(ids) <= MANY or letters <= MOST_LETTERS)
-        listed[field] = ids if fits else []
-        if fits:
-            left, letters_left = left - len(ids), letters_left - letters
-    return listed
-
-
-def _lists(schema: Any) -> Iterator[list[Any]]:
-    """All lists of values in a schema."""
-    if isinstance(schema, dict):
-        if "enum" in schema:
-            yield schema["enum"]
-        schema = [*schema.values()]
-    if isinstance(schema, list):
-        for each in schema:
-            yield from _lists(each)
+def is_listed(world: World) -> bool:
+    """Tell whether the tool of this world lists its ids; else its readers would not take as many."""
+    return len(world.entities) <= MOST_IDS and sum(len(each.id) for each in world.entities) <= MOST_LETTERS
 
 
 def _schema_of(kind: type[Struct]) -> Schema:

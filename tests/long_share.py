@@ -29,7 +29,6 @@ LONG = {
     "control/test_espeak.py": "each of its bodies starts eSpeak NG as a process",
     "control/test_own_synthesizer.py": "a synthesizer is a process",
     "control/test_synthesizer_that_fails.py": "a synthesizer is a process",
-    "control/test_unread_scripts.py": "eSpeak NG speaks, in a process",
     "control/test_voice_outlets.py": "loudspeakers are programs of the system",
     "control/test_voice_recognized.py": "eSpeak NG speaks, and a recognizer listens",
     "control/mujoco/test_described_contract.py": "another robot on the driver that test_mujoco_contract.py has",
@@ -37,6 +36,7 @@ LONG = {
     "recording/test_commands_on_damage.py": "each command on each damage; test_damage.py has what reading finds",
     "scenario/test_on_physics.py": "a whole task in physics; test_appendix_b.py has it on the simulated torso",
     "scenario/test_appendix_b_varied.py": "six more whole tasks; test_appendix_b.py has that of the thesis",
+    "hostile/test_attacks.py": "attacks at random; test_payloads.py has what is hostile by name",
     "growth": "half a day of a robot in virtual time",
     "cli/test_check_body.py": "each test checks a whole body by the command; control/ has the laws themselves",
     "access/test_table.py": "each row of the table over real sockets; test_denials.py has what a router tells",
@@ -86,6 +86,9 @@ LONG_TESTS = {
     "control/test_calibration.py": {
         "test_as_many_as_are_said_lie_within_the_stated_error": "many calibrations",
     },
+    "control/test_contract.py": {
+        "TestNoisyEncoders": "the laws of the torso again, with noise",
+    },
     "control/test_composed.py": {
         "TestApart": "the same body in other parts; TestComposedBody has all laws",
     },
@@ -97,12 +100,6 @@ LONG_TESTS = {
     },
     "docs/test_making_pages.py": {
         "test_arrows_point_down_and_boxes_keep_apart": "it draws all pictures of the site",
-    },
-    "hostile/test_attacks.py": {
-        "test_the_same_seed_does_the_same": "two attacks; it guards a tool",
-    },
-    "realizer/test_slices.py": {
-        "test_no_slice_of_planning_is_long": "each shape of a large block under a profiler",
     },
     "recognition/test_crowd.py": {
         "test_what_is_kept_does_not_grow_with_those_who_have_passed": "thousands of people",
@@ -121,6 +118,7 @@ LONG_TESTS = {
         "test_ten_thousand_requests_at_once_come_as_the_server_keeps_up_each_once_and_in_order": "so many",
     },
     "scenario/test_appendix_b.py": {
+        "test_a_misplaced_piece_is_asked_to_be_fixed_and_then_is_right": "another whole task",
         "test_everybody_looks_where_the_transcript_says[3]": "the task with another seed",
         "test_the_same_seed_gives_the_same_run_and_another_seed_the_same_events": (
             "the task again, and with another seed; test_demo.py has the same seed"

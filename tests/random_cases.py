@@ -1,8 +1,8 @@
 """How many random cases a test tries: a share in `make test`, all in `make test-long`.
 
-Only tests that take more than a second ask here. Who takes less gains nothing, and a share of the examples of such a
-test once passed over a mistake that all of them find. A share begins like the whole: what fails in it fails in the
-whole, too.
+Only tests that take more than a third of a second ask here. Who takes less gains nothing, and a share of the examples
+of such a test once passed over a mistake that all of them find. A share begins like the whole: what fails in it fails
+in the whole, too.
 """
 
 from hypothesis import settings

@@ -16,8 +16,9 @@ from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerGone
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.connection import connect
 from engage_hri.services.client.results import PerformFailed
-from engage_hri.services.client.robot import Robot, connect
+from engage_hri.services.client.robot import Robot
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.control.contract.body import MovementAuthority
@@ -110,7 +111,7 @@ async def test_who_leaves_a_lease_leaves_it_at_once_whatever_became_of_generatio
         if gone == "cut":
             hub.partition("generation")
         else:
-            hub.announce("generation", PeerGone(participant="generation"))
+            hub.announce(PeerGone(participant="generation"))
         await asyncio.sleep(0.5)
         if how == "cancelled":
             holding.cancel()

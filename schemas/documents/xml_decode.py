@@ -12,6 +12,7 @@ is of another namespace is left out of either, and noted. Text behind a referenc
 """
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Set
 from functools import cached_property
 from itertools import chain, count
@@ -23,12 +24,11 @@ from lxml import etree
 from engage_hri.schemas import allowed, vocabulary
 from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.behavior_types import TYPES
-from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.blocks import Block, Unread
 from engage_hri.schemas.check import check
 from engage_hri.schemas.documents import xml_grammar as grammar
 from engage_hri.schemas.documents.xml_encode import encode_xml
 from engage_hri.schemas.documents.xml_grammar import AnyStruct, fields
-from engage_hri.schemas.documents.xml_notes import Notes
 from engage_hri.schemas.documents.xml_source import (
     BML_1_0,
     CORE,
@@ -46,11 +46,13 @@ from engage_hri.schemas.documents.xml_source import (
 from engage_hri.schemas.documents.xml_speech import MARKS, language, spoken
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.references import disambiguated, in_draft_spelling
+from engage_hri.schemas.references import SYNC_NAMES, disambiguated, in_draft_spelling
 from engage_hri.schemas.suggestion import meant
 
 __all__ = ["decode_xml", "encode_xml"]
 
+MOST = 100
+"""Notes of one kind that are told: each takes time to make, and is a warning on the bus."""
 _STRAY = "{urn:engage}stray"
 """Tag of the elements that are about to be removed."""
 
@@ -99,7 +101,6 @@ class _Document:
 
     def _fragment(self, root: etree._Element) -> TurnFragment:
         self._is_strict = True
-        self._source.require_declared()
         raw = self._own_fields(root, TurnFragment)
         self._note_foreign(root, foreign_attributes(root))
         fragment = disambiguated(self._converted(root, raw | self._content(root), TurnFragment))
@@ -238,7 +239,7 @@ class _Document:
         self._note_foreign(element, grammar.foreign_parts(element), self._id(element))
         raw = fields(plain) if row.is_standard else self._own_fields(element, row.kind)
         raw |= {"id": self._id(element)} | ({"required": True} if required else {})
-        timing = [of.Timing(name, value) for name, value in plain.items() if name in grammar.SYNC_ATTRIBUTES]
+        timing = [of.Timing(name, value) for name, value in plain.items() if name in SYNC_NAMES]
         if local == "speech":
             timing += self._speech(element, raw)
         else:
@@ -377,7 +378,7 @@ class _Document:
     def _own_fields(self, element: etree._Element, kind: type[msgspec.Struct]) -> dict[str, Any]:
         """Read the attributes of an EBML element as fields. Raises InputRefused for an unknown attribute."""
         plain = attributes(element)
-        raw = fields({name: value for name, value in plain.items() if name not in grammar.SYNC_ATTRIBUTES})
+        raw = fields({name: value for name, value in plain.items() if name not in SYNC_NAMES})
         known = {*kind.__struct_fields__, "character_id", "propose" if kind is of.Reference else "id"}
         for name in sorted(raw.keys() - known):
             reason = f"<{local_name(element)}> has no attribute {grammar.attribute(name)!r}"
@@ -411,3 +412,28 @@ class _Document:
 def _ties(element: etree._Element) -> list[of.Timing]:
     children = (child for child in element if split(str(child.tag)) == (EBML, "timing"))
     return [of.Timing(child.get("sync", ""), child.get("ref", "")) for child in children]
+
+
+class Notes:
+    """Notes of one document, as they come."""
+
+    def __init__(self) -> None:
+        self._kept: list[Unread] = []
+        self._count = Counter[WarningKind]()
+
+    def is_full(self, kind: WarningKind) -> bool:
+        """Tell whether the next note of this kind is only counted, and needs no words."""
+        return self._count[kind] >= MOST
+
+    def add(self, message: str, behavior: str, kind: WarningKind) -> None:
+        if not self.is_full(kind):
+            self._kept.append(Unread(message=message, behavior=behavior, kind=kind))
+        self._count[kind] += 1
+
+    def told(self) -> list[Unread]:
+        """All notes, with one for each kind of which there are more."""
+        more = [(kind, number - MOST) for kind, number in self._count.items() if number > MOST]
+        return self._kept + [
+            Unread(message=f"{number} more {'part is' if number == 1 else 'parts are'} ignored", kind=kind)
+            for kind, number in more
+        ]

@@ -17,7 +17,7 @@ from engage_hri.schemas.documents.xml_source import BML_1_0, DRAFT, EBML
 from engage_hri.schemas.documents.xml_speech import fill, ties
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.references import type_name
+from engage_hri.schemas.references import SYNC_NAMES, type_name
 
 _ELSEWHERE = ("id", "required", "markup")
 """Fields that are written apart: `required`, for example, is an element around the others."""
@@ -108,7 +108,7 @@ def _express(face: etree._Element, namespace: str, expressions: Sequence[of.Expr
 
 def _set_timing(element: etree._Element, timings: Sequence[of.Timing]) -> None:
     names = [timing.sync for timing in timings]
-    if grammar.SYNC_ATTRIBUTES.issuperset(names) and len(set(names)) == len(names):
+    if SYNC_NAMES.issuperset(names) and len(set(names)) == len(names):
         for timing in timings:
             element.set(timing.sync, timing.ref)
         return

@@ -26,12 +26,11 @@ from engage_hri.schemas.documents.xml_source import (
     prefixed_name,
     split,
 )
-from engage_hri.schemas.syncref import SYNC_POINTS, SyncRef
+from engage_hri.schemas.references import SYNC_NAMES
+from engage_hri.schemas.syncref import SyncRef
 from engage_hri.schemas.vocabulary import SHAPES
 
 AnyStruct = TypeVar("AnyStruct", bound=msgspec.Struct)
-SYNC_ATTRIBUTES = frozenset({*SYNC_POINTS, "strokeStart", "strokeEnd", "attackPeak"})
-"""Attributes for inline timing."""
 OPERATORS: Mapping[str, type[of.Synchronize | of.Before | of.After]] = {
     "synchronize": of.Synchronize, "before": of.Before, "after": of.After,
 }  # fmt: skip
@@ -125,7 +124,7 @@ def known_attributes(local: str, kind: type[msgspec.Struct] | None) -> frozenset
 def _read(local: str, kind: type[msgspec.Struct] | None) -> set[str]:
     """Attributes that are read, besides those that become fields."""
     read = {"id", "type", "required", *DRAFTS.get(local, ()), *_OTHER_ATTRIBUTES.get(local, ())}
-    return read | (SYNC_ATTRIBUTES if kind else PARTS.get(local, {}).keys())
+    return read | (SYNC_NAMES if kind else PARTS.get(local, {}).keys())
 
 
 def of_drafts(plain: Mapping[str, str], local: str) -> Iterator[tuple[str, str]]:

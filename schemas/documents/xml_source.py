@@ -4,15 +4,15 @@ lxml reports the line on which a start tag ends; people look for the one on whic
 """
 
 import re
-from collections.abc import Iterable, Iterator, Set
+from collections.abc import Iterable, Iterator
 from itertools import islice
 from typing import cast
 
 from lxml import etree
 
-from engage_hri.schemas.behaviors import UNDECLARED
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.limits import LARGEST
+from engage_hri.schemas.utf8 import utf8
 
 DRAFT = "org.mindmakers.bml"
 BML_1_0 = "http://www.bml-initiative.org/bml/bml-1.0"
@@ -34,21 +34,16 @@ MOST_ELEMENTS = 120_000
 MOST_BEHAVIORS = 20_000
 MOST_ATTRIBUTES = 100
 """Attributes of one element. None in use has twenty, and lxml takes time quadratic in their number."""
-MOST_PREFIXES = 100
-"""Prefixes that may be used without being declared."""
 
-_UNDECLARED_PREFIX = "NS_ERR_UNDEFINED_NAMESPACE"
-_UNDECLARED = re.compile(r"Namespace prefix ([^\s\"'<>&=/]+) (?:for|on) ")
 _ADVICE = {
     "ERR_UNDECLARED_ENTITY": "write the character itself; only &amp; &lt; &gt; &quot; &apos; are known",
     "ERR_INVALID_CHAR": "remove it: XML holds no control characters",
     "ERR_DOCUMENT_END": "a document is one <bml> or one <ebml>",
     "ERR_ATTRIBUTE_REDEFINED": "name each attribute once",
+    "NS_ERR_UNDEFINED_NAMESPACE": f'declare the prefix, for example xmlns:ebml="{EBML}"',
 }
 """Advice by libxml2's name of the error."""
 _DECLARED = re.compile(rb"(?:\xef\xbb\xbf)?<\?xml[^>?]*?\sencoding\s*=\s*[\"']([A-Za-z0-9._-]+)[\"']")
-_ENCODINGS = re.compile(r"utf-?8|(?:us-)?ascii|iso-?8859-\d+|latin-?\d|windows-125\d|cp125\d", re.IGNORECASE)
-"""Encodings in which a `<` is a byte 0x3C: no tag can hide from `_start_lines`."""
 _ROOT_ID = re.compile(rb"<(?:[\w.-]+:)?e?bml\s[^<>]*?\bid\s*=\s*[\"']([^\"'<>&]+)[\"']")
 """Id of the document, near its beginning."""
 _NEAR = 4096
@@ -60,10 +55,7 @@ class Source:
     """A parsed document: its `root`, the id of that (`block`), its source's name, and the line of each element."""
 
     def __init__(self, data: bytes | str, name: str = "") -> None:
-        """Parse a document. Raises InputRefused if it is too large or too deep, malformed, or has a document type.
-
-        Elements with an undeclared prefix are of a namespace of their own, `UNDECLARED` and the prefix.
-        """
+        """Parse a document. Raises InputRefused if it is too large or too deep, malformed, or has a document type."""
         self.name = name
         self.block: str | None = None
         if len(data) > LARGEST:
@@ -85,9 +77,7 @@ class Source:
             if count > most:
                 raise self.refusal(f"more than {most} {what}", advice="split it into several blocks")
         self._lines = dict(zip(elements, _start_lines(text), strict=False))
-        self._elements = elements
         self._require_plain(elements)
-        self.require_declared([self.root])
         self._require_shallow()
 
     def line(self, element: etree._Element) -> int:
@@ -108,42 +98,29 @@ class Source:
         return InputRefused(Fault(reason=reason, where=self.name, line=line, advice=advice), self.block)
 
     def _decoded(self, data: bytes) -> str:
-        """Decode the bytes. Raises InputRefused for another encoding than declared, and for one that hides tags."""
-        if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            encoding = "utf-16"
-        elif data[1:4:2] == b"\0\0" or data[:3:2] == b"\0\0":
-            encoding = "utf-16-le" if data[0] else "utf-16-be"
-        else:
-            declared = _DECLARED.match(data)
-            encoding = declared[1].decode() if declared else "utf-8"
-            if not _ENCODINGS.fullmatch(encoding):
-                reason = f"malformed XML: encoding {encoding[:40]!r} is not read"
-                raise self.refusal(reason, line=1, advice="save it as UTF-8")
+        """Decode the bytes. Raises InputRefused for another encoding than UTF-8, or UTF-16 with its mark."""
+        declared = _DECLARED.match(data)
+        if declared and declared[1].upper() not in (b"UTF-8", b"UTF8", b"US-ASCII", b"ASCII"):
+            reason = f"malformed XML: encoding {declared[1].decode()[:40]!r} is not read"
+            raise self.refusal(reason, line=1, advice="save it as UTF-8")
         try:
-            return data.decode(encoding)
-        except UnicodeDecodeError as error:
-            line = data.count(b"\n", 0, error.start) + 1
-            reason = f"malformed XML: this is not {encoding} ({error.reason})"
-            raise self.refusal(reason, line=line, advice="save it as UTF-8, or declare its encoding") from error
-        except LookupError as error:
-            reason = f"malformed XML: encoding {encoding!r} is not known"
-            raise self.refusal(reason, line=1, advice="save it as UTF-8") from error
+            return utf8(data)
+        except InputRefused as error:
+            reason = f"malformed XML: {error.fault.reason}"
+            raise self.refusal(reason, line=error.fault.line, advice=error.fault.advice) from error
 
     def _parse(self, text: str) -> etree._Element:
-        """Parse the text strictly, but for undeclared prefixes: what has one is of a namespace that nobody knows.
-
-        They are declared here, and the text is parsed again, as strictly as before, so that no other error slips
-        through.
-        """
-        declared: set[str] = set()
-        while True:
-            parser = _parser()
-            try:
-                root = etree.fromstring(_declaring(text, declared).encode(errors="surrogatepass"), parser)
-            except etree.XMLSyntaxError as error:
-                declared |= self._undeclared(parser, error, declared)
-            else:
-                break
+        parser = _parser()
+        try:
+            root = etree.fromstring(text.encode(errors="surrogatepass"), parser)
+        except etree.XMLSyntaxError as error:
+            wrong = next((entry for entry in parser.error_log if entry.level_name != "WARNING"), None)
+            reason, kind = (wrong.message.strip(), wrong.type_name) if wrong else (str(error), "")
+            line = int(wrong.line if wrong else error.lineno or 0)
+            if reason.startswith("Excessive depth"):
+                raise self.refusal(f"nested deeper than {DEEPEST} levels", line=line, advice="unnest it") from error
+            advice = _ADVICE.get(kind, "close and quote everything")
+            raise self.refusal(f"malformed XML: {reason}", line=line, advice=advice) from error
         if root.getroottree().docinfo.doctype:  # type: ignore[union-attr]
             raise self._doctype(0)
         return root
@@ -152,34 +129,12 @@ class Source:
         reason = "a document type (<!DOCTYPE>) is not read"
         return self.refusal(reason, line=line, advice="remove it: no entities, no DTD")
 
-    def _undeclared(self, parser: etree.XMLParser, error: etree.XMLSyntaxError, known: Set[str]) -> set[str]:
-        """Find the prefixes to declare, at least one. Raises InputRefused for any other error."""
-        bad = [entry for entry in parser.error_log if entry.level_name != "WARNING"]
-        found = {match[1] for entry in bad if (match := _UNDECLARED.match(entry.message))} - known
-        wrong = next((entry for entry in bad if entry.type_name != _UNDECLARED_PREFIX), None)
-        if wrong is None and found and len(known) < MOST_PREFIXES:
-            return found
-        reason = wrong.message.strip() if wrong else str(error)
-        line = int(wrong.line if wrong else error.lineno or 0)
-        if reason.startswith("Excessive depth"):
-            raise self.refusal(f"nested deeper than {DEEPEST} levels", line=line, advice="unnest it") from error
-        advice = _ADVICE.get(wrong.type_name if wrong else "", "close and quote everything")
-        raise self.refusal(f"malformed XML: {reason}", line=line, advice=advice) from error
-
     def _require_plain(self, elements: Iterable[etree._Element]) -> None:
         """Refuse elements with too many attributes. Raises InputRefused."""
         for element in elements:
             if (count := len(element.attrib)) > MOST_ATTRIBUTES:
                 reason = f"<{split(str(element.tag))[1]}> has {count} attributes; at most {MOST_ATTRIBUTES} are read"
                 raise self.refusal(reason, element)
-
-    def require_declared(self, elements: Iterable[etree._Element] | None = None) -> None:
-        """Refuse elements with an undeclared prefix. elements: None: all. Raises InputRefused."""
-        for element in self._elements if elements is None else elements:
-            if str(element.tag).startswith(f"{{{UNDECLARED}"):
-                advice = f'declare the prefix, for example xmlns:ebml="{EBML}"'
-                reason = f"malformed XML: prefix of <{prefixed_name(element)}> is not declared"
-                raise self.refusal(reason, element, advice=advice)
 
     def _require_shallow(self) -> None:
         depth = 0
@@ -200,15 +155,6 @@ def _parser() -> etree.XMLParser:
         encoding="utf-8", recover=False, resolve_entities=False, load_dtd=False, dtd_validation=False,
         no_network=True, huge_tree=False, remove_comments=True, remove_pis=True,
     )  # fmt: skip
-
-
-def _declaring(text: str, prefixes: Set[str]) -> str:
-    """Declare `prefixes` at the root of a document, without changing its lines."""
-    if not prefixes:
-        return text
-    end = next(tag.end(1) for tag in _TAGS.finditer(text) if tag[1])
-    declarations = "".join(f' xmlns:{prefix}="{UNDECLARED}{prefix}"' for prefix in sorted(prefixes))
-    return f"{text[:end]}{declarations}{text[end:]}"
 
 
 def _last_line(element: etree._Element) -> int:
@@ -274,6 +220,6 @@ def local_name(element: etree._Element) -> str:
 
 
 def attributes(element: etree._Element) -> dict[str, str]:
-    """Attributes of BML and EBML, by local name. An attribute with an undeclared prefix is of neither."""
+    """Attributes of BML and EBML, by local name."""
     split_names = ((*split(str(name)), str(value)) for name, value in element.items())
-    return {local: value for space, local, value in split_names if space in READ and ":" not in local}
+    return {local: value for space, local, value in split_names if space in READ}

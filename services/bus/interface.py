@@ -12,7 +12,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Coroutine, Iterator
 from math import inf
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from msgspec.structs import replace
 
@@ -40,6 +40,7 @@ LOG = logging.getLogger("engage")
 """Log of all that is not one participant's. A line at level ERROR is a bug, and fails a test that expects none."""
 
 
+Reader = TypeVar("Reader", Subscription, Tap)
 Answer = Callable[[Message], Message | Coroutine[Any, Any, Message]]
 
 
@@ -69,6 +70,9 @@ class Bus(ABC):
         self.sight = Sight(name, lambda: self.unlinked_at)
         self._loop = asyncio.get_running_loop()
         self._gone = False
+        self._readers: list[Subscription | Tap] = []
+        self._overflowed = 0
+        """Messages that readers have dropped which are closed."""
         self._is_told_unsent = False
         self._refused = Often()
 
@@ -201,20 +205,47 @@ class Bus(ABC):
     def is_heard(self, key: str) -> bool:
         """Tell whether anybody has subscribed to `key`, in any process. For streams that cost something."""
 
-    @abstractmethod
     def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:
         """Queue all messages of these key expressions. Past ones come first, as the class of each key says.
 
         A pattern of class `alive` delivers `PeerAlive` for all participants that are there, then every change. It is
         over at once if this participant has left the bus.
         """
+        return self._attached(Subscription(patterns, keep, capacity, self._detached))
 
-    @abstractmethod
     def tap(self, *patterns: str, capacity: int = CAPACITY) -> Tap:
         """Queue all messages of these key expressions as they travel, undecoded; past ones as `subscribe` does.
 
         Messages that nobody can read are among them. capacity: bytes of the payloads that wait.
         """
+        return self._attached(Tap(patterns, capacity, self._detached))
+
+    def _attached(self, reader: Reader) -> Reader:
+        if self._gone:
+            reader.close()
+        else:
+            self._attach(reader)
+            self._readers.append(reader)
+        return reader
+
+    def _detached(self, reader: Subscription | Tap) -> None:
+        if reader in self._readers:
+            self._readers.remove(reader)
+            self._overflowed += reader.overflowed
+            self._detach(reader)
+
+    @abstractmethod
+    def _attach(self, reader: Subscription | Tap) -> None:
+        """Offer what is past to a reader, and what comes. Raises InputRefused: the keys do not allow its patterns."""
+
+    @abstractmethod
+    def _detach(self, reader: Subscription | Tap) -> None:
+        """Offer a reader nothing any more."""
+
+    @property
+    def overflowed(self) -> int:
+        """Number of messages that were dropped since a reader was too slow."""
+        return self._overflowed + sum(reader.overflowed for reader in self._readers)
 
     async def query(self, key: str, message: Message, timeout: Seconds = 1.0) -> Message:
         """Ask the server of an `rpc` key. Raises NoReply (absent, late) or InputRefused (it answered a Fault).

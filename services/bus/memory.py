@@ -12,25 +12,23 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import PerformBlock
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import PerformFragment
-from engage_hri.schemas.messages import Message, decode, encode, encoding_of, in_form, published
+from engage_hri.schemas.messages import Message, decode, in_form, published
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.status import BusHealth
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.answering import Answering
 from engage_hri.services.bus.interface import (
-    CAPACITY,
     Answer,
     Bus,
     Hub,
-    Keep,
     Received,
     Sample,
     Subscription,
     Tap,
 )
 from engage_hri.services.bus.payloads import LOCAL, read_payload
-from engage_hri.services.bus.subscription import KEYS_KEPT
+from engage_hri.services.bus.subscription import KEYS_KEPT, offer_presence
 
 
 class Past(NamedTuple):
@@ -164,12 +162,8 @@ class MemoryHub(Hub):
         """Offer a late subscriber the participants, then the past in order; returns its last number."""
         now = self._loop.time()
         for bus in self._buses.values():
-            if bus.is_alive and reader.wants(key := keys.alive(bus.name, bus.part)):
-                message = PeerAlive(participant=bus.name, run=bus.run)
-                if isinstance(reader, Tap):
-                    reader.offer(_presence(key, message, bus.name, now))
-                else:
-                    reader.offer(Received(key, message, bus.name, now))
+            if bus.is_alive:
+                offer_presence(reader, bus.part, PeerAlive(participant=bus.name, run=bus.run), now)
         recent = [past for past in self._past if now - past.received.at <= keys.HISTORY_MAX_AGE]
         for past in sorted((*recent, *self._state.values()), key=lambda past: past.number):
             if not reader.wants(past.received.key) or self._is_cut(name, past.received.source):
@@ -184,12 +178,10 @@ class MemoryHub(Hub):
     def alive(self) -> tuple[str, ...]:
         return tuple(sorted(bus.name for bus in self._buses.values() if bus.is_alive))
 
-    def announce(self, name: str, message: PeerAlive | PeerGone, part: keys.Part = "robot") -> None:
+    def announce(self, message: PeerAlive | PeerGone, part: keys.Part = "robot") -> None:
         journal.note_presence(message)
-        key, now = keys.alive(name, part), self._loop.time()
-        for bus in list(self._buses.values()):
-            bus.deliver(Received(key, message, name, now), self.sent + 1)
-            bus.show(_presence(key, message, name, now), self.sent + 1)
+        for reader in [reader for bus in self._buses.values() for reader in bus.readers]:
+            offer_presence(reader, part, message, self._loop.time())
 
     async def answerer(self, key: str, asker: str, deadline: Seconds) -> "MemoryBus | None":
         """Wait for a participant that serves the key; None at the deadline."""
@@ -223,10 +215,6 @@ class MemoryHub(Hub):
         self._state = {key: past for key, past in self._state.items() if past.received.source != name}
 
 
-def _presence(key: str, message: PeerAlive | PeerGone, name: str, now: Seconds) -> Sample:
-    return Sample(key, encode(message), encoding_of(message), name, now)
-
-
 class MemoryBus(Bus):
     """A participant's view of the bus in memory."""
 
@@ -240,14 +228,16 @@ class MemoryBus(Bus):
         self._wanting: dict[str, tuple[tuple[Subscription, int], ...]] = {}
         """Subscriptions that want a key, of keys seen lately: most messages are for few participants."""
         self._taps: dict[Tap, int] = {}
-        self._overflowed = 0
 
     @property
     def health(self) -> BusHealth:
-        readers: list[Subscription | Tap] = [*self._subscriptions, *self._taps]
-        overflowed = self._overflowed + sum(reader.overflowed for reader in readers)
         peers, passed = self._hub.alive, self._hub.sent
-        return BusHealth(peers=peers, passed=passed, overflowed=overflowed, failures=self.failures)
+        return BusHealth(peers=peers, passed=passed, overflowed=self.overflowed, failures=self.failures)
+
+    @property
+    def readers(self) -> tuple[Subscription | Tap, ...]:
+        """Readers of this participant."""
+        return tuple(self._readers)
 
     def local(self, stamp: Stamp) -> Seconds:
         return stamp.seconds
@@ -291,37 +281,25 @@ class MemoryBus(Bus):
             self._wanting[key] = wanting
         return wanting
 
-    def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:
-        subscription = Subscription(patterns, keep, capacity, self._drop)
-        if self._gone:
-            subscription.close()
+    def _attach(self, reader: Subscription | Tap) -> None:
+        if isinstance(reader, Tap):
+            self._taps[reader] = self._hub.replay(self.name, reader)
         else:
-            self._subscriptions[subscription] = self._hub.replay(self.name, subscription)
+            self._subscriptions[reader] = self._hub.replay(self.name, reader)
             self._wanting.clear()
-        return subscription
 
-    def _drop(self, subscription: Subscription) -> None:
-        self._wanting.clear()
-        if self._subscriptions.pop(subscription, None) is not None:
-            self._overflowed += subscription.overflowed
+    def _detach(self, reader: Subscription | Tap) -> None:
+        if isinstance(reader, Tap):
+            self._taps.pop(reader, None)
+        else:
+            self._subscriptions.pop(reader, None)
+            self._wanting.clear()
 
     def show(self, sample: Sample, number: int) -> None:
         """Offer a sample to the taps."""
         for tap, replayed in self._taps.items():
             if number > replayed and tap.wants(sample.key):
                 tap.offer(sample)
-
-    def tap(self, *patterns: str, capacity: int = CAPACITY) -> Tap:
-        tap = Tap(patterns, capacity, self._drop_tap)
-        if self._gone:
-            tap.close()
-        else:
-            self._taps[tap] = self._hub.replay(self.name, tap)
-        return tap
-
-    def _drop_tap(self, tap: Tap) -> None:
-        if self._taps.pop(tap, None) is not None:
-            self._overflowed += tap.overflowed
 
     async def _query(self, key: str, message: Message, deadline: Seconds) -> Message | None:
         asked = self._hub.carried(key, message)
@@ -339,11 +317,10 @@ class MemoryBus(Bus):
     def declare_alive(self) -> None:
         if not self.is_alive and not self._gone:
             self.is_alive = True
-            self._hub.announce(self.name, PeerAlive(participant=self.name, run=self.run), self.part)
+            self._hub.announce(PeerAlive(participant=self.name, run=self.run), self.part)
 
     async def leave(self) -> None:
-        readers: list[Subscription | Tap] = [*self._subscriptions, *self._taps]
-        for reader in readers:
+        for reader in self.readers:
             reader.close()
         self.vanish()
 
@@ -355,7 +332,8 @@ class MemoryBus(Bus):
         self._subscriptions.clear()
         self._wanting.clear()
         self._taps.clear()
+        self._readers.clear()
         self._hub.forget(self.name)
         if self.is_alive:
             self.is_alive = False
-            self._hub.announce(self.name, PeerGone(participant=self.name), self.part)
+            self._hub.announce(PeerGone(participant=self.name), self.part)

@@ -8,6 +8,7 @@ from enum import Enum, auto
 from typing import Any, Generic, Self, TypeVar
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.messages import encode, encoding_of
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.samples import Received as Received
@@ -228,3 +229,14 @@ class Tap(_Queue[Sample]):
         item = super()._remove(index)
         self.waiting -= self._weight(item)
         return item
+
+
+def offer_presence(reader: Subscription | Tap, part: keys.Part, message: PeerAlive | PeerGone, now: Seconds) -> None:
+    """Offer the news that a participant is there, or is gone, to a reader that wants it. part: of its presence."""
+    key = keys.alive(message.participant, part)
+    if not reader.wants(key):
+        return
+    if isinstance(reader, Tap):
+        reader.offer(Sample(key, encode(message), encoding_of(message), message.participant, now))
+    else:
+        reader.offer(Received(key, message, message.participant, now))

@@ -60,12 +60,13 @@ def _refused(estimate: Estimate, bars: Mapping[str, Mapping[str, str]], target: 
 
 
 def changed(act: Act, then: World, now: World) -> bool:
-    """True if an object of a reference that may be chosen again has moved or left since `then`."""
+    """True if an object of a reference that may be chosen again has moved, left or come back since `then`."""
     for made in act.open_hinges:
         was, is_now = then.entity(made.object), now.entity(made.object)
-        if was is None:
-            continue
-        if is_now is None or sum((a - b) ** 2 for a, b in zip(was.position, is_now.position, strict=True)) > MOVED**2:
+        if was is None or is_now is None:
+            if was is not is_now:
+                return True
+        elif sum((a - b) ** 2 for a, b in zip(was.position, is_now.position, strict=True)) > MOVED**2:
             return True
     return False
 

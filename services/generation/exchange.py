@@ -1,4 +1,4 @@
-"""Generation's dealings with realizer, body and recognition, as values: what it asks for, and what comes of that."""
+"""Values between generation and its shell: what it asks of others and what comes of that, besides messages."""
 
 from typing import Literal
 
@@ -9,7 +9,9 @@ from engage_hri.schemas.faults import EngageError, Fault, OutcomeUnknown, Reques
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Request
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.sight import NEVER
 
+NAME = "generation"
 Question = DescribeBody | EstimateBehaviors
 _ERRORS = {"refused": RequestRefused, "unknown": OutcomeUnknown, "failed": RunFailed}
 
@@ -44,11 +46,9 @@ class NoAnswer(Struct, frozen=True, tag="no_answer"):
     @staticmethod
     def of(error: EngageError) -> "NoAnswer":
         """Make the value that stands for an exception."""
-        kinds: dict[Literal["refused", "unknown"], type[EngageError]] = {
-            "refused": RequestRefused, "unknown": OutcomeUnknown,
-        }  # fmt: skip
-        kind = next((kind for kind, of in kinds.items() if isinstance(error, of)), "failed")
-        return NoAnswer(error.fault, kind)  # type: ignore[arg-type]
+        if isinstance(error, RequestRefused):
+            return NoAnswer(error.fault, "refused")
+        return NoAnswer(error.fault, "unknown" if isinstance(error, OutcomeUnknown) else "failed")
 
     @property
     def error(self) -> EngageError:
@@ -65,13 +65,16 @@ class AnswerCame(Struct, frozen=True, tag="answer_came"):
     answer: Message | NoAnswer | None
 
 
+class GenerationBegan(Struct, frozen=True, tag="generation_began"):
+    """The first step of a life. covered_for: see `CoveredObjects`."""
+
+    covered_for: Seconds
+
+
 class OwnSight(Struct, frozen=True, tag="own_sight"):
-    """Knowledge of this process of itself: others are not to blame for what it did not see. As in `Sight`.
+    """Knowledge of this process of itself: others are not to blame for what it did not see. As in `Sight`."""
 
-    None: that never was.
-    """
-
-    woke_at: Seconds | None
-    asleep_at: Seconds | None
-    slept: Seconds
-    unlinked_at: Seconds | None
+    woke_at: Seconds = NEVER
+    asleep_at: Seconds = NEVER
+    slept: Seconds = 0.0
+    unlinked_at: Seconds = NEVER

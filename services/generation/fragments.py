@@ -23,7 +23,7 @@ from engage_hri.schemas.fragments import PerformFragment
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
-from engage_hri.schemas.requests import Accepted, Heard
+from engage_hri.schemas.requests import Accepted, Heard, Refused
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.sight import Sight
@@ -39,7 +39,7 @@ from engage_hri.services.generation.choosing_again import (
     without,
 )
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.exchange import CancelRequest, NoAnswer, SendRequest
+from engage_hri.services.generation.exchange import NAME, CancelRequest, NoAnswer, SendRequest
 from engage_hri.services.generation.fragment_check import check_world, performable
 from engage_hri.services.generation.head.arbiter import Arbiter
 from engage_hri.services.generation.head.inhibitions import Leases
@@ -172,7 +172,7 @@ class Fragments:
                 for performance in self._live.values():
                     if performance.fragment.id == block and not performance.is_over:
                         performance.hear(message)
-            case Utterance():
+            case Utterance() if message.actor != self._robot:
                 self._heard.feed(message, now)
                 self._turns.hear(
                     message.actor, message.text, began=self._clock.local(message.began, now), is_final=message.final,
@@ -227,9 +227,8 @@ class Fragments:
         due = (self._turns.deadline, self._outcomes.deadline, self._waits.earliest)
         return min((each for each in due if each is not None), default=None)
 
-    def settle(self, now: Seconds) -> list[tuple[str, Fault]]:
-        """End turns and fragments that are over by now. Returns the requests to refuse, each with the reason."""
-        refused: list[tuple[str, Fault]] = []
+    def settle(self, now: Seconds) -> None:
+        """End turns and fragments that are over by now."""
         for id, performance in self._live.items():
             self._waits.keep(("undecided", id), performance.deadline, now)
         due = {*iter(lambda: self._waits.due(now), None)}
@@ -243,7 +242,8 @@ class Fragments:
             if performance.refusal is not None:
                 self._forget(performance)
                 self._outcomes.refuse(performance.fragment.id, performance.turn)
-                refused.append((performance.request.id, performance.refusal))
+                self._tell(AnswerRequest(Refused(id=performance.request.id, fault=performance.refusal)))
+                self._tell(PublishMessage(keys.fault(NAME), performance.refusal))
             elif outcome := performance.outcome(self._events, is_due=("undecided", performance.request.id) in due):
                 self._forget(performance)
                 self._outcomes.end(outcome, performance.turn, now)
@@ -256,7 +256,6 @@ class Fragments:
             self._tell(PublishMessage(keys.TURN_CLOSED, closed))
         self._events.forget({*going, *self._outcomes.turns})
         self._heard.forget({*going, *self._outcomes.turns})
-        return refused
 
     def _forget(self, performance: FragmentPerformance) -> None:
         del self._live[performance.request.id]
@@ -330,7 +329,7 @@ class Fragments:
         except Exception as error:
             what = f"fragment {performance.fragment.id}"
             self._tell(TellMistake(error, what))
-            performance.fail(RunFailed(bug(error, what, "generation")), self._now)
+            performance.fail(RunFailed(bug(error, what, NAME)), self._now)
         self._block_ended(performance)
 
     def _send_block(self, performance: FragmentPerformance) -> Generator[Any, Any, bool]:
@@ -346,12 +345,13 @@ class Fragments:
             motions = yield from self._body.motions(targets(fragment), permits().only_hand, moving, glanced)
             if performance.is_over:
                 return False
-            assert self._world is not None
-            world = remembered(self._world, performance.known)
+            seen = self._world
+            assert seen is not None
+            world = remembered(seen, performance.known)
             fragment, lost = bearable(fragment, world, self._robot)
             performance.warn(lost)
             check_world(fragment, world, self._robot)  # it may have changed while the fragment waited
-            bars = barred(targets(fragment), self._world, performance.known, performance.barred)
+            bars = barred(targets(fragment), seen, performance.known, performance.barred)
             body = self._body.capabilities
             if body is not None:
                 self._arbiter.gaze_perceived_within(body.gaze_half_angle)
@@ -372,7 +372,7 @@ class Fragments:
             if permits() == permitted:
                 break  # else something is inhibited now that would be begun
         performance.begin(made)
-        performance.world = world
+        performance.world = seen
         self._turns.fragment_begins(turn.turn)
         if not performance.accepted:  # From here on the robot may speak.
             self._tell(AnswerRequest(Heard(id=performance.request.id)))
@@ -408,7 +408,7 @@ class Fragments:
         try:
             act, turn, now = performance.acts[-1], performance.turn_left, self._world
             assert now is not None
-            performance.world = world = remembered(now, performance.known)
+            performance.world, world = now, remembered(now, performance.known)
             fragment = open_references(performance.left, act)
             bars = barred(targets(fragment), now, performance.known, performance.barred)
             permits, body = self._leases.permits(), self._body

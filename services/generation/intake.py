@@ -31,9 +31,9 @@ from engage_hri.schemas.recognition import ConnectionEvent, Statistics, session_
 from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused, Unreadable, kind_of
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
-from engage_hri.services.bus.sight import NEVER, Sight
+from engage_hri.services.bus.sight import Sight
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.exchange import AnswerCame, OwnSight, SendRequest
+from engage_hri.services.generation.exchange import NAME, AnswerCame, GenerationBegan, OwnSight, SendRequest
 from engage_hri.services.generation.fragment_check import lacks_people
 from engage_hri.services.generation.fragments import Fragments
 from engage_hri.services.generation.head.arbiter import Arbiter
@@ -45,7 +45,6 @@ from engage_hri.services.reports.world_report import WorldReport
 from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.runtime.intake import AnswerRequest, Input, MachineClocks, PublishMessage, TellMistake
 
-NAME = "generation"
 WORLD_PATIENCE: Seconds = 5.0
 """Time that a fragment waits for a first report of the world, or for a person to speak to: cameras start as the robot
 does. Ours."""
@@ -57,7 +56,7 @@ Told = (
 """Messages that generation takes into account, besides requests."""
 Asked = PerformFragment | Inhibit | SetCondition | Cancel
 """Requests that it serves."""
-Content = Told | Asked | AnswerCame | OwnSight
+Content = Told | Asked | AnswerCame | GenerationBegan | OwnSight
 _TOLD = get_args(Told)
 
 
@@ -69,22 +68,14 @@ def reads(message: object) -> TypeGuard[Told]:
 class GenerationIntake:
     """All of generation but its requests' lives. session: part of the ids of what it sends, of this life alone."""
 
-    def __init__(
-        self,
-        robot: str,
-        config: GenerationConfig,
-        clock: MachineClocks,
-        session: str,
-        covered_for: Seconds = COVERED_FOR,
-    ) -> None:
-        """covered_for: see `CoveredObjects`."""
+    def __init__(self, robot: str, config: GenerationConfig, clock: MachineClocks, session: str) -> None:
         self._robot = robot
         self._clock = clock
         self._session = session
         self._now: Seconds = 0.0
         self._outputs: list[Struct] = []
-        self._unlinked_at = NEVER
-        self._sight = Sight(NAME, lambda: self._unlinked_at)
+        self._own_sight = OwnSight()
+        self._sight = Sight(NAME, lambda: self._own_sight.unlinked_at)
         self._arbiter = Arbiter(robot, config)
         self._shifts: dict[str, str] = {}
         """Gaze shifts of the arbiter under way, by the id of their request."""
@@ -92,7 +83,7 @@ class GenerationIntake:
         self._fragments = Fragments(
             robot, config, clock, session, self._sight, self._arbiter, self._leases, self._outputs.append
         )
-        self._objects = CoveredObjects(covered_for)
+        self._objects = CoveredObjects(COVERED_FOR)
         self._reports = ActionReports(robot, REPORT_GRACE, clock.name, self._instant)
         self._perception = Publisher()
         self._seen = WorldReport(REPORT_GRACE)
@@ -109,12 +100,6 @@ class GenerationIntake:
         due = (self._fragments.deadline, self._arbiter.deadline, self._patience.earliest, *reports)
         return min((each for each in due if each is not None), default=None)
 
-    def begin(self, now: Seconds) -> list[Struct]:
-        """The condition that holds from the start."""
-        self._now = now
-        self._tell_condition()
-        return self._take()
-
     def advance(self, now: Seconds) -> list[Struct]:
         """Take the step that is due by now."""
         self._now = now
@@ -129,7 +114,10 @@ class GenerationIntake:
         message = input.message
         with self._containing(f"{input.key or message.__class__.__name__} from {input.source or 'a stranger'}"):
             self._fragments.go_on(now)
-            if isinstance(message, OwnSight):
+            if isinstance(message, GenerationBegan):
+                self._objects = CoveredObjects(message.covered_for)
+                self._tell_condition()
+            elif isinstance(message, OwnSight):
                 self._look(message)
             elif isinstance(message, AnswerCame):
                 self._answer(message, now)
@@ -176,12 +164,9 @@ class GenerationIntake:
                 self._fragments.feed(message, now)
                 if not message.retold:
                     self._arbiter.feed(message, now)
-            case Utterance():
-                if message.actor != self._robot:
-                    self._fragments.feed(message, now)
             case RobotState() | Statistics():
                 self._arbiter.feed(message, now)
-            case SyncPointProgress() | WordSpoken():
+            case Utterance() | SyncPointProgress() | WordSpoken():
                 self._fragments.feed(message, now)
             case Unreadable(block=block, fault=fault):
                 self._warn(block, "PARSING_FAILURE", fault.within(block))
@@ -224,9 +209,8 @@ class GenerationIntake:
                 self._arbiter.shift_failed(shift, now)
 
     def _look(self, own: OwnSight) -> None:
-        self._unlinked_at = _at(own.unlinked_at)
-        self._sight.woke_at, self._sight.asleep_at = _at(own.woke_at), _at(own.asleep_at)
-        self._sight.slept = own.slept
+        self._own_sight = own
+        self._sight.woke_at, self._sight.asleep_at, self._sight.slept = own.woke_at, own.asleep_at, own.slept
 
     # -- requests -------------------------------------------------------------------------------------------------
 
@@ -327,8 +311,7 @@ class GenerationIntake:
                 self._give_up(request, now)
         is_any_begun = True
         while is_any_begun:
-            for id, fault in self._fragments.settle(now):
-                self._refuse(id, fault)
+            self._fragments.settle(now)
             self._rule(now)
             is_any_begun = self._fragments.begin(now)
 
@@ -353,10 +336,6 @@ class GenerationIntake:
             id = f"{self._session}/{ruling.shift.id}"
             self._shifts[id] = ruling.shift.id
             self._outputs.append(SendRequest(keys.BLOCK, PerformBlock(id=id, block=ruling.shift.block)))
-
-
-def _at(time: Seconds | None) -> Seconds:
-    return NEVER if time is None else time
 
 
 def _how(cancel: Cancel) -> Literal["lapsed", "released", "owner_lost"]:

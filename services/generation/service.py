@@ -4,7 +4,6 @@ import asyncio
 from collections import deque
 from collections.abc import Callable
 from functools import partial
-from math import isfinite
 from typing import Any
 
 from msgspec import Struct
@@ -16,20 +15,22 @@ from engage_hri.schemas.covered import COVERED_FOR
 from engage_hri.schemas.faults import EngageError, RunFailed
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import session_of
-from engage_hri.schemas.requests import Accepted, Cancel, Heard, Refused
+from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.exchange import (
+    NAME,
     AnswerCame,
     AskBody,
     CancelRequest,
+    GenerationBegan,
     NoAnswer,
     OwnSight,
     Question,
     SendRequest,
 )
-from engage_hri.services.generation.intake import NAME, GenerationIntake, reads
+from engage_hri.services.generation.intake import GenerationIntake, reads
 from engage_hri.services.requests.ends import RequestDesk, Requester
 from engage_hri.services.requests.pending import News
 from engage_hri.services.runtime.alarm import Alarm
@@ -55,9 +56,9 @@ async def generate(bus: Bus, ready: Ready, config: GenerationConfig, *, covered_
     """
     with bus.subscribe(*PATTERNS) as inbox:
         async with asyncio.TaskGroup() as tasks:
-            generation = _Generation(bus, config, covered_for, tasks)
+            generation = _Generation(bus, config, tasks)
             try:
-                generation.begin()
+                generation.take_own(GenerationBegan(covered_for))
                 tell_settings(bus, NAME, config, covered_for=covered_for)
                 ready()
                 async for received in inbox:
@@ -70,24 +71,20 @@ async def generate(bus: Bus, ready: Ready, config: GenerationConfig, *, covered_
 class _Generation:
     """The parts of the service: both ends of requests, and generation with its ledger."""
 
-    def __init__(self, bus: Bus, config: GenerationConfig, covered_for: Seconds, tasks: asyncio.TaskGroup) -> None:
+    def __init__(self, bus: Bus, config: GenerationConfig, tasks: asyncio.TaskGroup) -> None:
         self._bus = bus
         self._tasks = tasks
         self._desk = RequestDesk(bus, NAME, self._cancel)
         self._requests = Requester(bus)
         clock = BusClock(bus)
-        self._intake = GenerationIntake(bus.robot, config, clock, session_of(bus.run), covered_for)
+        self._intake = GenerationIntake(bus.robot, config, clock, session_of(bus.run))
         self._steps = NotedIntake(bus, NAME, self._intake, clock, self._carry_out)
         self._alarm = Alarm(partial(self._do, self._steps.advance))
         self._due: deque[Callable[[], None]] = deque()
         """Steps to do; what the first of them led to is being carried out."""
         self._is_over = False
-        self._own_sight = OwnSight(None, None, 0.0, None)
+        self._own_sight = OwnSight()
         """What the intake knows of it."""
-
-    def begin(self) -> None:
-        for output in self._intake.begin(self._bus.now()):
-            self._carry_out(output)
 
     def close(self) -> None:
         self._is_over = True
@@ -106,6 +103,9 @@ class _Generation:
             input = Input(received.key, message, received.source, received.at, received.past, received.life)
             self._take(input, received.number)
 
+    def take_own(self, content: GenerationBegan | AnswerCame) -> None:
+        self._do(partial(self._steps.take_own, content))
+
     def _cancel(self, cancel: Cancel) -> None:
         self._take(Input(keys.cancel(NAME), cancel, "", self._bus.now()))
 
@@ -120,7 +120,7 @@ class _Generation:
     def _has_come(self, id: str, answer: Message | News) -> None:
         """Take news of a question or a request."""
         news = NoAnswer.of(answer) if isinstance(answer, EngageError) else answer
-        self._take(Input("", AnswerCame(id, news), "", self._bus.now()))  # type: ignore[arg-type]
+        self.take_own(AnswerCame(id, news))  # type: ignore[arg-type]
 
     def _take(self, input: Input[Any], number: int = 0) -> None:
         self._do(partial(self._steps.take, input, number))
@@ -142,9 +142,7 @@ class _Generation:
         sight, due = self._bus.sight, self._intake.deadline
         if due is not None:
             sight.look(self._bus.now(), due)
-        times = (at if isfinite(at) else None for at in (sight.woke_at, sight.asleep_at, sight.unlinked_at()))
-        woke_at, asleep_at, unlinked_at = times
-        own = OwnSight(woke_at, asleep_at, sight.slept, unlinked_at)
+        own = OwnSight(sight.woke_at, sight.asleep_at, sight.slept, sight.unlinked_at())
         if own != self._own_sight:
             self._own_sight = own
             self._steps.take_own(own)
@@ -156,14 +154,8 @@ class _Generation:
             match output:
                 case PublishMessage(key=key, message=message):
                     self._bus.publish(key, message)
-                case AnswerRequest(answer=Heard(id=id)):
-                    self._desk.hear(id)
-                case AnswerRequest(answer=Accepted(id=id)):
-                    self._desk.accept(id)
-                case AnswerRequest(answer=Refused(id=id, fault=fault)):
-                    self._desk.refuse(id, fault)
-                case AnswerRequest(answer=outcome):
-                    self._desk.end(outcome)
+                case AnswerRequest(answer=answer):
+                    self._desk.answer(answer)
                 case SendRequest(key=key, request=PerformBlock(id=id) as block):
                     self._requests.send(key, block, tell=partial(self._has_come, id))
                 case SendRequest(key=key, request=request):

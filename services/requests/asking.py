@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from math import inf
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
@@ -39,21 +40,133 @@ from engage_hri.schemas.requests import (
 )
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.sight import Sight
-from engage_hri.services.requests.asked import SentRequest, Server
-from engage_hri.services.requests.asking_effects import (
-    AskingFault,
-    Effect,
-    PublishCommand,
-    Renew,
-    TellAccepted,
-    TellEnd,
-)
 from engage_hri.services.requests.asking_table import TABLE, AskingAction, AskingEvent, AskingState
 from engage_hri.services.requests.deadlines import Silences
-from engage_hri.services.requests.patience import Patience
 from engage_hri.services.requests.records import ANEW, unwieldy
-from engage_hri.services.requests.window import SendWindow
 from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
+
+
+class PublishCommand(Struct, frozen=True):
+    """Publish this message. expression: the key expression of the command, as in `schemas/keys.py`."""
+
+    expression: str
+    message: Request
+
+
+class Renew(Struct, frozen=True):
+    """Send `server` a `KeepAlive` for these requests."""
+
+    server: str
+    live: tuple[Kept, ...]
+
+
+class TellAccepted(Struct, frozen=True):
+    """Tell the caller that the server has accepted the request."""
+
+    id: str
+    answer: Accepted
+
+
+class TellEnd(Struct, frozen=True):
+    """Tell the caller how the request has ended. There is exactly one for each request."""
+
+    id: str
+    end: Outcome | EngageError
+
+
+class AskingFault(Struct, frozen=True):
+    """Publish this fault for all to see."""
+
+    fault: Fault
+
+
+Effect = PublishCommand | Renew | TellAccepted | TellEnd | AskingFault
+
+
+class Patience(Struct, frozen=True, kw_only=True):
+    """Limits of a requester, times in seconds.
+
+    first_resend: until a request that nobody has answered is sent again; the wait doubles up to longest_resend.
+    grace: how long the server may be gone before its requests fail: a restart of the router looks like a death. By
+    then it has ended them, if it lives: it misses us a silent link's lease later than we miss it, and has its grace.
+    pulse: between two `KeepAlive`. lease: how long a request that is not renewed stays alive at its server.
+    cancel: how long after its cancellation a request may take to end. silence: how long a server that is there may
+    leave a request without any answer. swallow: how long late answers to a request that was given up are ignored.
+    window: number of requests that a server may have before it without an answer; more wait here.
+    """
+
+    first_resend: Seconds = 0.3
+    longest_resend: Seconds = 2.0
+    grace: Seconds = 4.0
+    pulse: Seconds = 1.0
+    lease: Seconds = 5.0
+    cancel: Seconds = 30.0
+    silence: Seconds = 30.0
+    swallow: Seconds = 60.0
+    window: int = 64
+
+
+class SentRequest:
+    """One request. run: the life of the server that accepted it. sent_at: when it was sent last; None: never."""
+
+    def __init__(self, expression: str, request: Request) -> None:
+        self.expression = expression
+        self.server = keys.server_of(expression)
+        self.kind = kind_of(request)
+        self.request = request
+        self.cancel: Cancel | None = None
+        self.state = AskingState.SENT
+        self.run = ""
+        self.sent_at: Seconds | None = None
+        self.resend_after: Seconds = 0.0
+
+
+class Server:
+    """The requests that one server is asked to keep alive.
+
+    period: seconds between two `KeepAlive`. soon: seconds until the one after the next.
+    """
+
+    def __init__(self, period: Seconds) -> None:
+        self.kept: dict[str, SentRequest] = {}
+        self.period = period
+        self.soon = period
+
+
+class SendWindow:
+    """Requests to one server that are on their way without an answer; those that wait for that, in their order.
+
+    Who asks for ten thousand things at once would else fill the links and the queue of the server, which are the
+    others' too, and would send again what only has not come yet.
+    """
+
+    def __init__(self, size: int) -> None:
+        """size: number of requests that may be on their way."""
+        self._size = size
+        self._on_their_way: set[str] = set()
+        self._waiting: dict[str, None] = {}
+
+    def has_waiting(self, id: str) -> bool:
+        """True for a request that has not been sent, and waits for others."""
+        return id in self._waiting
+
+    def enter(self, id: str) -> bool:
+        """Tell whether a request may be sent, also again; it waits if not."""
+        if id not in self._on_their_way and len(self._on_their_way) >= self._size:
+            self._waiting[id] = None
+            return False
+        self._waiting.pop(id, None)
+        self._on_their_way.add(id)
+        return True
+
+    def leave(self, id: str) -> str | None:
+        """Take the news that a request has been answered, or is given up; returns the one that may be sent now."""
+        self._waiting.pop(id, None)
+        if id not in self._on_their_way:
+            return None
+        self._on_their_way.discard(id)
+        return next(iter(self._waiting), None)
+
 
 _Said = Answer | None
 """The answer of the server that is the event; None with all other events."""

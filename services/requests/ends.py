@@ -33,7 +33,6 @@ from engage_hri.schemas.requests import (
     Accepted,
     Answer,
     Cancel,
-    Heard,
     KeepAlive,
     Outcome,
     Refused,
@@ -43,11 +42,10 @@ from engage_hri.schemas.requests import (
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Containing, Received, Subscription
 from engage_hri.services.bus.samples import sender_of
-from engage_hri.services.requests import asking_effects, serving_effects
+from engage_hri.services.requests import asking, serving
 from engage_hri.services.requests.admission import borrowed, misplaced
-from engage_hri.services.requests.asking import Asking
+from engage_hri.services.requests.asking import Asking, Patience
 from engage_hri.services.requests.asking_table import AskingState
-from engage_hri.services.requests.patience import Patience
 from engage_hri.services.requests.pending import News, Pending
 from engage_hri.services.requests.records import unwieldy
 from engage_hri.services.requests.serving import Serving
@@ -99,7 +97,7 @@ class Requester:
             self._listen()
         effects = self._asking.send(key, request, self._bus.now(), within)
         match effects:
-            case [asking_effects.TellEnd(end=EngageError() as error)]:
+            case [asking.TellEnd(end=EngageError() as error)]:
                 return self._failed(key, request, error, tell)
         if (pending := self._pending.get(request.id)) is None:
             pending = self._pending[request.id] = Pending(key, request, tell)
@@ -139,21 +137,21 @@ class Requester:
     def _tick(self) -> None:
         self._carry_out(self._asking.tick(self._bus.now()))
 
-    def _carry_out(self, effects: list[asking_effects.Effect]) -> None:
+    def _carry_out(self, effects: list[asking.Effect]) -> None:
         for effect in effects:  # isinstance is twice as quick as patterns, and this is done for each message
-            if isinstance(effect, asking_effects.PublishCommand):
+            if isinstance(effect, asking.PublishCommand):
                 try:
                     self._publish(effect.expression, effect.message)  # type: ignore[arg-type]
                 except Exception as error:
                     # At the end of this very list: it may be long.
                     effects += self._could_not_send(effect.message.id, error)
-            elif isinstance(effect, asking_effects.TellAccepted):
+            elif isinstance(effect, asking.TellAccepted):
                 if (pending := self._pending.get(effect.id)) is not None:
                     pending.accept(effect.answer)
-            elif isinstance(effect, asking_effects.TellEnd):
+            elif isinstance(effect, asking.TellEnd):
                 if (ended := self._pending.pop(effect.id, None)) is not None:
                     ended.end(effect.end)
-            elif isinstance(effect, asking_effects.Renew):
+            elif isinstance(effect, asking.Renew):
                 at, name = self._bus.stamp(), self._bus.name
                 still = KeepAlive(live=effect.live, at=at, requester=name, life=self._life)
                 self._publish(keys.keep_alive(effect.server), still)
@@ -161,7 +159,7 @@ class Requester:
                 self._bus.publish(keys.fault(self._bus.name), effect.fault)
         self._alarm.set(self._asking.deadline)
 
-    def _could_not_send(self, id: str, error: Exception) -> list[asking_effects.Effect]:
+    def _could_not_send(self, id: str, error: Exception) -> list[asking.Effect]:
         """End a request that has no encoded form (half a character in its text, for instance); the others go on."""
         fault = Fault(
             reason=str(error), where=id, advice="text in Unicode, numbers in their range, fields of their type"
@@ -254,7 +252,7 @@ class RequestDesk:
         on_cancel: Callable[[Cancel], None],
         *,
         on_extend: Callable[[Request], None] | None = None,
-        on_hold: Callable[[serving_effects.HoldRequest], None] | None = None,
+        on_hold: Callable[[serving.HoldRequest], None] | None = None,
         term: Seconds | None = None,
     ) -> None:
         self._bus = bus
@@ -331,44 +329,45 @@ class RequestDesk:
             return self._carry_out(self._serving.refuse(message, fault))
         return self._carry_out(self._serving.take(message, now, sender))
 
-    def hear(self, name: str) -> None:
-        """Tell the requester that it is not accepted, but may have begun: no other life is to begin it."""
-        self._answer(name, Heard(id=name))
-
     def accept(self, name: str, within: Seconds | None = None) -> None:
         """Tell the requester that the request is being performed. within: see `Accepted`."""
-        self._answer(name, Accepted(id=name, within=within))
+        self.answer(Accepted(id=name, within=within))
 
     def refuse(self, name: str, fault: Fault) -> None:
         """End the request: it will not be performed."""
-        self._answer(name, Refused(id=name, fault=fault))
+        self.answer(Refused(id=name, fault=fault))
 
     def end(self, outcome: Message) -> None:
         """End a request with its outcome, which has the request's name as its id."""
         assert isinstance(outcome, Outcome)
-        self._answer(outcome.id, outcome)
+        self.answer(outcome)
 
-    def _answer(self, name: str, answer: Answer) -> None:
+    def answer(self, answer: Message) -> None:
+        """Answer a request in any way; the answer has the request's name as its id.
+
+        `Heard`: it is not accepted, but may have begun, so that no other life is to begin it.
+        """
+        assert isinstance(answer, Answer)
         fault = getattr(answer, "fault", None)
         if fault is not None and not fault.service:
             answer = replace(answer, fault=replace(fault, service=self._server))
-        self._carry_out(self._serving.answer(name, answer, self._bus.now()))
+        self._carry_out(self._serving.answer(answer.id, answer, self._bus.now()))
 
     def _tick(self) -> None:
         self._carry_out(self._serving.tick(self._bus.now()))
 
-    def _carry_out(self, effects: list[serving_effects.Effect], /) -> Request | None:
+    def _carry_out(self, effects: list[serving.Effect], /) -> Request | None:
         """Carry out the effects; returns the request that has just come, if the service is to see it."""
         handed: Request | None = None
         for effect in effects:
-            if isinstance(effect, serving_effects.PublishAnswer):
+            if isinstance(effect, serving.PublishAnswer):
                 self._bus.publish(self._answers, effect.answer, again=effect.again)  # type: ignore[arg-type]
-            elif isinstance(effect, serving_effects.Hand):
+            elif isinstance(effect, serving.Hand):
                 if effect.is_asked:
                     handed = effect.request
                 else:
                     self._call_back(effect.request)
-            elif isinstance(effect, serving_effects.HoldRequest):
+            elif isinstance(effect, serving.HoldRequest):
                 if self._on_hold is not None:
                     with self._bus.containing(f"request {effect.name}, which nobody renews"):
                         self._on_hold(effect)

@@ -7,6 +7,7 @@ and id, and calls each by a name that no other request of this server has or had
     effects = serving.answer(name, Accepted(id=name), now)      # what the service decides
 """
 
+from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
 from math import inf
 
@@ -33,10 +34,68 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.sight import LATE, Sight
 from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.requests.ended import EndedRequests
-from engage_hri.services.requests.names import Names
 from engage_hri.services.requests.records import ANEW, Key, Record, content_of, event_of, key_of
-from engage_hri.services.requests.serving_effects import Effect, Hand, HoldRequest, PublishAnswer, ServingFault
 from engage_hri.services.requests.serving_table import TABLE, ServingAction, ServingEvent, ServingState
+
+
+class PublishAnswer(Struct, frozen=True):
+    """Publish this answer. again: it has been given before."""
+
+    answer: Answer
+    again: bool = False
+
+
+class Hand(Struct, frozen=True):
+    """Give this to the service: a request, new or changed, or a `Cancel`. Its `id` is its name at this server.
+
+    is_asked: the message itself has just come; otherwise it was made here, as after a lease is over.
+    """
+
+    request: Request
+    is_asked: bool
+
+
+class HoldRequest(Struct, frozen=True, tag="hold_request"):
+    """Tell the service to hold the request of this name, since nobody renews it, or to go on with it.
+
+    until: when it ends unless it is renewed; None: it goes on. why: what has happened, and whose it was.
+    """
+
+    name: str
+    until: Seconds | None
+    why: Fault | None = None
+
+
+class ServingFault(Struct, frozen=True):
+    """Publish this fault for all to see. is_ours: it is a mistake of the service itself."""
+
+    fault: Fault
+    is_ours: bool
+
+
+Effect = PublishAnswer | Hand | HoldRequest | ServingFault
+
+
+KEPT = 4096
+
+
+class Names:
+    """Names that were not given lately: the id itself, then `ask~2`, `ask~3`. kept: ids that are remembered."""
+
+    def __init__(self, kept: int = KEPT) -> None:
+        self._kept = kept
+        self._used: OrderedDict[str, int] = OrderedDict()
+
+    def unique(self, id: str) -> str:
+        """A name for `id` that no other has."""
+        while (count := self._used.pop(id, 0) + 1) > 1:
+            self._used[id] = count
+            id = f"{id}~{count}"
+        self._used[id] = count
+        while len(self._used) > self._kept:
+            self._used.popitem(last=False)
+        return id
+
 
 GRACE: Seconds = 2.0
 """Seconds that a requester may be gone before its requests end: a restart of the router looks like a death."""

@@ -22,15 +22,15 @@ Cell = str | int | float | bool | None
 
 
 def events(records: Iterable[EventRecord]) -> str:
-    return _csv(EVENT_COLUMNS, (msgspec.structs.astuple(record) for record in records))
+    return table(EVENT_COLUMNS, (msgspec.structs.astuple(record) for record in records))
 
 
 def sessions(records: Iterable[SessionRecord]) -> str:
-    return _csv(SESSION_COLUMNS, map(_session, records))
+    return table(SESSION_COLUMNS, map(_session, records))
 
 
 def findings(found: Iterable[HypothesisResult]) -> str:
-    return _csv(HypothesisResult.__struct_fields__, (msgspec.structs.astuple(finding) for finding in found))
+    return table(HypothesisResult.__struct_fields__, (msgspec.structs.astuple(finding) for finding in found))
 
 
 def _session(record: SessionRecord) -> list[Cell]:
@@ -43,7 +43,8 @@ def _session(record: SessionRecord) -> list[Cell]:
     ]  # fmt: skip
 
 
-def _csv(columns: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
+def table(columns: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
+    """A table as CSV. rows: numbers are written to the millionth, true and false in small letters."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)

@@ -7,7 +7,7 @@ seed.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
@@ -50,56 +50,15 @@ def paired(differences: Sequence[float]) -> Paired:
     n = len(d)
     if n == 0:
         return Paired(n=0)
-    mean = float(d.mean())
-    test = _SignFlips(d)
+    if n <= EXACT:
+        signs = 1.0 - 2.0 * ((np.arange(2**n)[:, None] >> np.arange(n)) & 1)
+    else:
+        drawn = np.random.default_rng(0).integers(0, 2, (DRAWS, n))
+        # The sample itself is one of the choices, so that p is never zero.
+        signs = np.vstack([np.ones((1, n)), 1.0 - 2.0 * drawn])
     spread = float(d.std(ddof=1)) if n > 1 else 0.0
-    varies = spread > 1e-9 * float(np.abs(d).max())
-    low, high = (test.end(-1), test.end(+1)) if test.can_reject else (None, None)
-    return Paired(n=n, mean=mean, low=low, high=high, effect=mean / spread if varies else None, p=test.p(0.0))
-
-
-class _SignFlips:
-    """Sums of a sample under all choices of signs, or under many, and the sums of the signs alone."""
-
-    def __init__(self, d: Array) -> None:
-        n = len(d)
-        if n <= EXACT:
-            signs = 1.0 - 2.0 * ((np.arange(2**n)[:, None] >> np.arange(n)) & 1)
-        else:
-            drawn = np.random.default_rng(0).integers(0, 2, (DRAWS, n))
-            # The sample itself is one of the choices, so that p is never zero.
-            signs = np.vstack([np.ones((1, n)), 1.0 - 2.0 * drawn])
-        self._sums = signs @ d
-        self._ones = signs.sum(axis=1)
-        self._sum, self._n = float(d.sum()), n
-        self._d = d
-
-    @property
-    def can_reject(self) -> bool:
-        """True if a sample of this size can be significant; two choices of signs are always as extreme."""
-        return 2.0 / 2.0**self._n < LEVEL
-
-    def p(self, shift: float) -> Probability:
-        """Two-sided p of the hypothesis that the true difference is `shift`."""
-        slack = 1e-9 * float(np.abs(self._d - shift).sum())  # sums that are equal but for rounding
-        extreme = np.abs(self._sums - shift * self._ones) >= abs(self._sum - shift * self._n) - slack
-        return float(extreme.mean())
-
-    def end(self, side: int) -> float:
-        """Lower (-1) or upper (+1) end of the differences that the test does not reject."""
-        inside = self._sum / self._n
-        # Beyond the most extreme difference all signs are the same: certainly rejected.
-        outside = float(self._d.min() if side < 0 else self._d.max())
-        outside += side * 1e-9 * max(1.0, abs(outside))
-        if self.p(outside) >= LEVEL:
-            return outside
-        for _ in range(STEPS):
-            middle = (inside + outside) / 2
-            if self.p(middle) >= LEVEL:
-                inside = middle
-            else:
-                outside = middle
-        return inside
+    # Two choices of signs are always as extreme.
+    return _tested(float(d.mean()), signs / n, d, np.ones(n), 2.0 / 2.0**n, n, spread)
 
 
 def separate(first: Sequence[float], second: Sequence[float]) -> Paired:
@@ -110,62 +69,55 @@ def separate(first: Sequence[float], second: Sequence[float]) -> Paired:
     deviation within groups (Cohen's d).
     """
     a, b = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
-    n = len(a) + len(b)
+    n, k = len(a) + len(b), len(b)
     if not len(a) or not len(b):
         return Paired(n=n)
-    test = _Divisions(a, b)
-    mean = float(b.mean() - a.mean())
+    divisions = math.comb(n, k)
+    if divisions <= DRAWS:
+        chosen = np.array(list(combinations(range(n), k)))
+    else:
+        drawn = np.random.default_rng(0).random((DRAWS, n)).argsort(axis=1)[:, :k]
+        # The sample itself is one of the divisions, so that p is never zero.
+        chosen = np.vstack([np.arange(n - k, n), drawn])
+    weights = np.full((len(chosen), n), -1.0 / (n - k))
+    np.put_along_axis(weights, chosen, 1.0 / k, axis=1)
     within = float(((a - a.mean()) ** 2).sum() + ((b - b.mean()) ** 2).sum())
     spread = (within / (n - 2)) ** 0.5 if n > 2 else 0.0
-    varies = spread > 1e-9 * float(np.abs(np.concatenate([a, b])).max())
-    low, high = (_end(test.p, mean, test.widest, side) for side in (-1, +1)) if test.can_reject else (None, None)
-    return Paired(n=n, mean=mean, low=low, high=high, effect=mean / spread if varies else None, p=test.p(0.0))
+    # Of equal sizes two divisions are always as extreme.
+    least = (2 if len(a) == len(b) else 1) / divisions
+    both = np.concatenate([a, b])
+    mean = float(b.mean() - a.mean())
+    return _tested(mean, weights, both, np.repeat([0.0, 1.0], [len(a), k]), least, n, spread)
 
 
-class _Divisions:
-    """Divisions of two samples into groups of their sizes: all, or many. They are rows of weights of a mean."""
+def _tested(
+    mean: float, weights: Array, sample: Array, moved: Array, least: Probability, n: int, spread: float
+) -> Paired:
+    """Test a sample against all that it could as well have been.
 
-    def __init__(self, a: Array, b: Array) -> None:
-        self._a, self._b = a, b
-        n, k = len(a) + len(b), len(b)
-        self._number = math.comb(n, k)
-        if self._number <= DRAWS:
-            chosen = np.array(list(combinations(range(n), k)))
-        else:
-            drawn = np.random.default_rng(0).random((DRAWS, n)).argsort(axis=1)[:, :k]
-            # The sample itself is one of the divisions, so that p is never zero.
-            chosen = np.vstack([np.arange(n - k, n), drawn])
-        self._weights = np.full((len(chosen), n), -1.0 / (n - k))
-        np.put_along_axis(self._weights, chosen, 1.0 / k, axis=1)
-        self.widest = float(np.ptp(np.concatenate([a, b]))) * 2 + 1.0
-        """More than any difference of means that is not rejected."""
+    mean: that of the sample itself. weights: a row for each that it could have been, with which the sample gives its
+    mean. moved: 1 where a true difference would be added. least: the smallest p. spread: standard deviation, for the
+    effect.
+    """
+    widest = 2 * float(np.ptp(sample)) + 1.0  # a difference that far from the mean is certainly rejected
 
-    @property
-    def can_reject(self) -> bool:
-        """True if samples of these sizes can be significant; of equal sizes two divisions are always as extreme."""
-        extreme = 2 if len(self._a) == len(self._b) else 1
-        return extreme / self._number < LEVEL
-
-    def p(self, shift: float) -> Probability:
+    def p(shift: float) -> Probability:
         """Two-sided p of the hypothesis that the true difference is `shift`."""
-        values = np.concatenate([self._a, self._b - shift])
-        slack = 1e-9 * float(np.abs(values).sum() + 1e-12)  # means that are equal but for rounding
-        observed = abs(float(self._b.mean() - shift - self._a.mean()))
-        return float((np.abs(self._weights @ values) >= observed - slack).mean())
+        values = sample - shift * moved
+        slack = 1e-9 * float(np.abs(values).mean() + 1e-12)  # means that are equal but for rounding
+        return float((np.abs(weights @ values) >= abs(mean - shift) - slack).mean())
 
+    def end(side: int) -> float:
+        """Lower (-1) or upper (+1) end of the differences that the test does not reject."""
+        inside, outside = mean, mean + side * widest
+        for _ in range(STEPS):
+            middle = (inside + outside) / 2
+            inside, outside = (middle, outside) if p(middle) >= LEVEL else (inside, middle)
+        return inside
 
-def _end(p: Callable[[float], Probability], middle: float, widest: float, side: int) -> float:
-    """Lower (-1) or upper (+1) end of the differences that a test does not reject."""
-    inside, outside = middle, middle + side * widest
-    if p(outside) >= LEVEL:
-        return outside
-    for _ in range(STEPS):
-        between = (inside + outside) / 2
-        if p(between) >= LEVEL:
-            inside = between
-        else:
-            outside = between
-    return inside
+    low, high = (end(-1), end(+1)) if least < LEVEL else (None, None)
+    varies = spread > 1e-9 * float(np.abs(sample).max())
+    return Paired(n=n, mean=mean, low=low, high=high, effect=mean / spread if varies else None, p=p(0.0))
 
 
 def holm(ps: Sequence[Probability | None]) -> list[Probability | None]:

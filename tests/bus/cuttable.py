@@ -80,7 +80,8 @@ class CuttableHub(MemoryHub):
     def _is_cut(self, one: str, other: str) -> bool:
         return frozenset((one, other)) in self._apart
 
-    def announce(self, name: str, message: PeerAlive | PeerGone, part: keys.Part = "robot") -> None:
+    def announce(self, message: PeerAlive | PeerGone, part: keys.Part = "robot") -> None:
+        name = message.participant
         for bus in list(self._buses.values()):
             if not self._is_cut(name, bus.name):
                 self._tell(bus, message, name, part)

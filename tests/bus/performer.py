@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import Wait
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.body import PerformBehavior
-from engage_hri.schemas.requests import A, Cancel, Request, answering
+from engage_hri.schemas.requests import A, Cancel, Heard, Request, answering
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.requests.ends import Pending, RequestDesk
 
@@ -39,7 +39,7 @@ class Server:
         self.bus = hub.join(name)
         self.desk = RequestDesk(self.bus, name, self.cancel)
         self.seconds = seconds
-        self.begun = self.desk.accept if accepts else self.desk.hear
+        self.begun = self.desk.accept if accepts else lambda id: self.desk.answer(Heard(id=id))
         self.taken: list[Request] = []
         self.ended: list[str] = []
         self.timers: dict[str, asyncio.TimerHandle] = {}

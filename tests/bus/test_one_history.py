@@ -140,7 +140,7 @@ class Story:
             await self.start()
 
     def _is_at(self, reader: Reader, speaker: Speaker) -> bool:
-        return reader.inbox in getattr(speaker.bus, "_subscriptions")  # noqa: B009
+        return reader.inbox in getattr(speaker.bus, "_readers")  # noqa: B009
 
     def lie(self) -> None:
         """Publish in the name of a process, at a place of its order that it has not come to yet."""

@@ -9,7 +9,6 @@ import pytest
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.json_codec import read
 from tests.cli.command import ALONE, FRAGMENT, GOOD_BLOCK, Engage
-from tests.schemas.feedback_reader import decode_feedback
 from tests.schemas.grammar import violations
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -92,17 +91,6 @@ def test_what_is_refused_when_played_is_refused_here(engage: Engage, tmp_path: P
     assert (result.code, result.out) == (2, "")
     assert f"{path}:3" in result.err
     assert "blue-circle" in result.err
-
-
-def test_the_documented_feedback_is_feedback() -> None:
-    stream = shown("bml.md")[-1]
-
-    assert len(decode_feedback(stream)) == 4
-    head, *elements, _ = stream.strip().splitlines()
-    declared = " ".join(re.findall(r'xmlns\S*="[^"]*"', head))
-    for element in elements:
-        named = re.sub("(?<=<)[A-Za-z]+", rf"\g<0> {declared}", element, count=1)
-        assert violations(named, "bml-1.0-feedback.rng") == []
 
 
 @pytest.mark.parametrize("arguments", [(), ("--dialect", "2.0", "x"), ("--core",)])

@@ -4,10 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from tests.cli.command import Engage
 from tests.cli.test_play import lines
-from tests.schemas.feedback_reader import decode_feedback
 
 PLAY = ("play", "--embedded", "--virtual-time", "--quiet")
 REFUSED = {
@@ -67,38 +65,6 @@ def test_what_is_required_and_fails_while_running_is_a_failure(engage: Engage, b
     (end,) = lines(result.out, type="block_progress", progress="end")
     assert end["status"] == "failed"
     assert result.code == 3
-
-
-@pytest.mark.parametrize("named", ["out.xml", "-"])
-def test_feedback_as_xml(engage: Engage, block: Path, named: str) -> None:
-    block.write_text(
-        '<bml id="b" characterId="Melvin" xmlns="http://www.bml-initiative.org/bml/bml-1.0">'
-        '<gaze id="g" target="human" end="1"/><gaze id="x" target="unicorn"/></bml>'
-    )
-    out = Path("-") if named == "-" else block.with_name(named)
-    format = ("--feedback-format", "xml") if named == "-" else ()
-
-    result = engage(*PLAY, *format, "--feedback", out, block)
-
-    said = decode_feedback(result.out if named == "-" else out.read_text())
-    assert [type(each) for each in (said[0], said[-1])] == [BlockProgress, BlockProgress]
-    assert [each.sync for each in said if isinstance(each, SyncPointProgress)] == ["start", "ready", "relax", "end"]
-    (warning,) = [each for each in said if isinstance(each, WarningFeedback)]
-    assert (warning.behavior, warning.kind) == ("x", "NO_SUCH_TARGET")
-    (prediction, *_) = [each for each in said if isinstance(each, PredictionFeedback)]
-    assert {point.type for point in prediction.points} == {"gaze"}
-    assert {each.character_id for each in said} == {"Melvin"}
-
-
-def test_a_refusal_is_told_as_xml(engage: Engage, block: Path) -> None:
-    block.write_text("<bml id='b'>")
-
-    result = engage(*PLAY, "--feedback", block.with_name("out.xml"), block)
-
-    (warning,) = decode_feedback(block.with_name("out.xml").read_bytes())
-    assert isinstance(warning, WarningFeedback)
-    assert warning.block is None
-    assert result.code == 2
 
 
 def test_a_fragment_of_which_no_word_is_spoken_has_failed(engage: Engage, tmp_path: Path) -> None:

@@ -57,16 +57,6 @@ def test_it_is_told_once_counted_and_written_again_without_a_torn_line() -> None
     assert str(file.settle()) == "events: 4 lines are lost: cannot write: No space left on device"
 
 
-def test_the_head_of_a_document_waits_for_room() -> None:
-    disk = Disk(0)
-    file = Patient("feedback.xml", disk.put, lambda line: None, begin="<head>\n")
-    file.write("<lost/>\n")
-    disk.room = 100
-    file.write("<kept/>\n")
-
-    assert disk.content == b"<head>\n<kept/>\n"
-
-
 def test_a_disk_that_is_full_again_and_again_is_told_at_the_first_tenth_and_hundredth_time() -> None:
     disk, told = Disk(0), list[str]()
     file = Patient("events", disk.put, told.append)

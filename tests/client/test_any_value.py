@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from engage_hri.schemas.faults import EngageError, InputRefused
 from engage_hri.schemas.summary import Summary
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.connection import connect
 from engage_hri.services.client.inputs import block_in, call_in, fragment_in
 from engage_hri.services.client.language_models import perform_call, stream
-from engage_hri.services.client.robot import Robot, connect
+from engage_hri.services.client.robot import Robot
 from engage_hri.services.control.testing.plugin import virtual_loop
 from tests.random_cases import share_of
 
@@ -54,6 +55,7 @@ VALUES = st.recursive(
 CALL = {"turn_status": "full", "parts": [{"say": "hi"}]}
 
 
+@settings(max_examples=share_of(100, 3))
 @given(value=VALUES)
 @pytest.mark.parametrize("read", [fragment_in, block_in, call_in])
 def test_what_is_no_input_is_refused(read: Callable[[Any, str], object], value: Any) -> None:

@@ -18,7 +18,6 @@ LENIENT = {
     NAMES_ONLY,
     "marks in every spelling",
     "what points means is the same in every spelling",
-    "those of others are ignored without one, also with an undeclared prefix",
     "descriptions are ignored",  # also where the standard has none, and without a priority
 }
 """Rules about what is read beyond the standard."""

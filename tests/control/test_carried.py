@@ -8,9 +8,8 @@ import pytest
 
 from engage_hri.schemas.behaviors import Gaze, Pointing, PostureShift
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.control.bases.composed import composed
+from engage_hri.services.control.bases.composed import Member, composed
 from engage_hri.services.control.bases.driver_guard import GuardedBody
-from engage_hri.services.control.bases.members import Member
 from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.testing import WORLD, Stage, performed
 from engage_hri.services.control.torso.body import SimulatedBody

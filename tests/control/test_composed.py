@@ -20,8 +20,7 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, JointAngle, PlannedTime
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.services.control.bases.composed import ComposedBody, composed
-from engage_hri.services.control.bases.members import Member
+from engage_hri.services.control.bases.composed import ComposedBody, Member, composed
 from engage_hri.services.control.contract.body import BehaviorRefused, Body, MouthShape, MovementAuthority, Reached
 from engage_hri.services.control.testing.asked import BEHAVIORS, WORLD
 from engage_hri.services.control.testing.contract import BodyContract

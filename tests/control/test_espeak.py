@@ -14,16 +14,15 @@ from engage_hri.schemas.documents.prosody import Prosody, marked_up, spans
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.speakable import tokens
 from engage_hri.schemas.world import World
-from engage_hri.services.control.bases.composed import composed
-from engage_hri.services.control.bases.members import Member
+from engage_hri.services.control.bases.composed import Member, composed
 from engage_hri.services.control.contract.body import Arrived, BodyFailed, MovementAuthority, Progress, Reached, Spoke
 from engage_hri.services.control.testing import BodyContract
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.voice.clauses import clause
 from engage_hri.services.control.voice.espeak import EspeakSettings, EspeakSynthesizer, ssml
-from engage_hri.services.control.voice.phrases import pieces
 from engage_hri.services.control.voice.sounding import EspeakVoice
 from engage_hri.services.control.voice.synthesis import Phrase
+from engage_hri.services.control.voice.timeline import pieces
 from tests.random_cases import trials
 
 pytest.importorskip("espeakng_loader", reason="needs the extra `voice`")

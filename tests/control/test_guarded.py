@@ -12,9 +12,8 @@ from engage_hri.schemas.behaviors import BlockBehavior, Gaze
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, JointAngle
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.world import World
-from engage_hri.services.control.bases.composed import composed
+from engage_hri.services.control.bases.composed import Member, composed
 from engage_hri.services.control.bases.driver_guard import GuardedBody
-from engage_hri.services.control.bases.members import Member
 from engage_hri.services.control.contract.body import (
     BehaviorRefused,
     BodyFailed,

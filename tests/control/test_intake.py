@@ -23,7 +23,7 @@ from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.body import Reached, Revocation
 from engage_hri.services.control.serving import effects, steps
 from engage_hri.services.control.serving.intake import ControlIntake
-from engage_hri.services.requests.serving_effects import HoldRequest
+from engage_hri.services.requests.serving import HoldRequest
 from engage_hri.services.runtime.intake import AnswerRequest, Input, PublishMessage
 
 STUCK = Fault(reason="its arm is stuck", service="control")

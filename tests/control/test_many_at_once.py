@@ -20,7 +20,7 @@ from engage_hri.services.control.figure.kinematics import (
     Side,
     Unreachable,
 )
-from engage_hri.services.control.figure.table_lift import LIFTS, MARGIN, SIZES, clear_of_table
+from engage_hri.services.control.figure.tracks import LIFTS, MARGIN, SIZES, clear_of_table
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import (
     LEAST,

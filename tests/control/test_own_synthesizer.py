@@ -12,10 +12,9 @@ from engage_hri.schemas.world import World
 from engage_hri.services.control.bases.drivers import made
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.body import MovementAuthority, Reached, Spoke
-from engage_hri.services.control.voice.alignment import FRAME, Loudness
-from engage_hri.services.control.voice.clauses import laid_out
-from engage_hri.services.control.voice.phrases import pieces
+from engage_hri.services.control.voice.clauses import FRAME, Loudness, laid_out
 from engage_hri.services.control.voice.synthesis import Said, SynthesisFailed
+from engage_hri.services.control.voice.timeline import pieces
 
 PAGE = (Path(__file__).parents[2] / "docs" / "control.md").read_text(encoding="utf-8")
 SENTENCES = (

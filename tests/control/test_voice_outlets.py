@@ -30,14 +30,14 @@ from engage_hri.services.control.testing import Stage
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.voice import player
 from engage_hri.services.control.voice.clauses import clause
-from engage_hri.services.control.voice.outlets import STUCK, Gag, Nowhere, Outlet, Several
+from engage_hri.services.control.voice.outlets import STUCK, Gag, Outlet, Several
 from engage_hri.services.control.voice.parts import sounding
-from engage_hri.services.control.voice.phrases import pieces
 from engage_hri.services.control.voice.settings import VoiceSettings
 from engage_hri.services.control.voice.silent import SilentVoice
 from engage_hri.services.control.voice.sounding import SoundingVoice
 from engage_hri.services.control.voice.speaking import CHECK, OnePart, utter_parts
 from engage_hri.services.control.voice.synthesis import Heard, Phrase, Said, Synthesizer
+from engage_hri.services.control.voice.timeline import pieces
 from engage_hri.services.control.voice.wav import WavFile
 
 FULL = pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no /dev/full here")
@@ -65,6 +65,13 @@ def listening(voice: Voice) -> list[Fault]:
     return faults
 
 
+def file_of(voice: Voice) -> WavFile:
+    assert isinstance(voice._outlet.outlet, Several)
+    outlet = voice._outlet.outlet._outlets[-1]
+    assert isinstance(outlet, WavFile)
+    return outlet
+
+
 async def said(voice: Voice, text: str) -> list[str]:
     speech = Speech(id="s", text=text)
     progress = [each async for each in voice.perform(speech, MovementAuthority(speech, "end"))]
@@ -76,11 +83,8 @@ async def test_a_file_without_room_is_told_once_and_the_loudspeaker_goes_on(monk
     voice = Voice(VoiceSettings(file="/dev/full"))
     faults = listening(voice)
     async with voice.connected():
-        assert voice._wav is not None
-        loudspeaker = Nowhere(asyncio.get_running_loop().time)
-        monkeypatch.setattr(
-            voice, "_outlet", Gag(Several([loudspeaker, voice._wav]), asyncio.get_running_loop().time)
-        )
+        now = asyncio.get_running_loop().time
+        monkeypatch.setattr(voice, "_outlet", Gag(Several([Outlet(now), file_of(voice)]), now))
         for _ in range(2):
             assert await said(voice, "one two") == ["one", "two"]
 
@@ -105,9 +109,8 @@ async def test_a_file_that_has_room_again_takes_sound_again(tmp_path: Path) -> N
     voice = Voice(VoiceSettings(file=str(tmp_path / "said.wav")))
     faults = listening(voice)
     async with voice.connected():
-        assert voice._wav is not None
         for _ in range(2):
-            voice._wav._fail("No space left on device", "is the disk full?")
+            file_of(voice)._fail("No space left on device", "is the disk full?")
             assert await said(voice, "one two") == ["one", "two"]
 
     assert len(faults) == 2
@@ -409,7 +412,7 @@ def test_a_cut_behind_the_end_of_a_file_and_one_of_a_file_that_failed_change_not
         outlet.play(said, 0.0)
         before = path.read_bytes()
         if has_failed:
-            outlet.fault = Fault(reason="the file is full")
+            outlet._fault = Fault(reason="the file is full")
         outlet.cut(0.05 if has_failed else 0.2, tail)
         assert path.read_bytes() == before
 

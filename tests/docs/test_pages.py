@@ -30,7 +30,6 @@ from tests.docs.pages import (
     left_to_the_reader,
     spans,
 )
-from tests.schemas.feedback_reader import decode_feedback
 
 pytestmark = pytest.mark.real_time
 
@@ -76,7 +75,7 @@ the beginning is enough."""
 TALK = """\
 from contextlib import suppress
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.client.robot import connect
+from engage_hri.services.client.connection import connect
 
 async with connect() as robot:
     await robot.person()
@@ -178,8 +177,6 @@ class Page:
         path.write_text(block.text)
         if block.name and any(block.name in item.text for item in self.items if item.line > block.line):
             return ""
-        if "<ebml:feedback" in block.text:
-            return "" if decode_feedback(block.text) else "no feedback"
         if '"status"' in block.text:
             msgspec.json.decode(block.text, type=Summary, strict=True)
             return ""

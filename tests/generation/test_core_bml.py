@@ -12,7 +12,6 @@ from engage_hri.schemas.behavior_types import dialect_sync, sync_points
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.documents.dialects import core, in_dialect
 from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
-from engage_hri.schemas.documents.xml_feedback import encode_feedback
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.feedback import BlockProgress, Feedback, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import TurnFragment
@@ -167,7 +166,6 @@ def test_without_the_extension_every_block_is_bml_1_0_and_plays(
         reached = [each for each in feedback if isinstance(each, SyncPointProgress) and each.behavior == behavior.id]
         known = [dialect_sync(sync, type_name(behavior), "bml-1.0") for sync in sync_points(behavior)]
         assert [each.sync for each in reached] == [sync for sync in known if sync is not None]
-    assert [each for each in feedback if violations(encode_feedback(each), "bml-1.0-feedback.rng")] == []
     (end,) = [each.time for each in feedback if isinstance(each, BlockProgress) and each.progress == "end"]
     assert end <= longest + MISESTIMATED
 

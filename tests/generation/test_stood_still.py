@@ -164,9 +164,9 @@ async def test_recognition_that_came_back_while_generation_stood_still_has_lost_
         await asyncio.sleep(1.0)
         loop = asyncio.get_running_loop()
         due = loop.time() + GRACE
-        hub.announce("recognition", PeerGone(participant="recognition"))
+        hub.announce(PeerGone(participant="recognition"))
         loop.call_at(due - 0.1, stand_still, due + 0.5)
-        loop.call_at(due + 0.5 + came, hub.announce, "recognition", PeerAlive(participant="recognition", run=run))
+        loop.call_at(due + 0.5 + came, hub.announce, PeerAlive(participant="recognition", run=run))
         await asyncio.sleep(GRACE + 2.0)
 
         assert pending.outcome.done() == is_lost

@@ -21,7 +21,7 @@ from engage_hri.services.recognition.perceive.clock_errors import PEOPLE_KEPT
 from engage_hri.services.recording.disk import FULL_CHUNK
 from engage_hri.services.recording.writing import MOST_CHANNELS
 from engage_hri.services.requests.deadlines import SLACK
-from engage_hri.services.requests.names import KEPT as NAMES_KEPT
+from engage_hri.services.requests.serving import KEPT as NAMES_KEPT
 from tests.growth.lives import CALM, life
 from tests.growth.reach import Growth, grown, modules, running, sizes
 from tests.random_cases import share_of

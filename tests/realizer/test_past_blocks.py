@@ -93,7 +93,7 @@ CASES = [
 def test_a_tie_to_a_block_that_ends_is_kept_or_told_whenever_it_comes(number: int) -> None:
     """Every hundredth of a second from 0 to 5, and each tie at some of them."""
     instants = range(500)[number::10]
-    for each in instants[: share_of(len(instants))] if number % 2 else instants[-share_of(len(instants)) :]:
+    for each in instants[: share_of(len(instants), 10)] if number % 2 else instants[-share_of(len(instants), 10) :]:
         assert_kept_or_told(each / 100, *CASES[(7 * each) % len(CASES)])
 
 

@@ -16,9 +16,10 @@ from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventOutcom
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.connection import connect
 from engage_hri.services.client.event_stream import EventStream
 from engage_hri.services.client.feeds import EventFeed
-from engage_hri.services.client.robot import Robot, connect
+from engage_hri.services.client.robot import Robot
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.service import running
@@ -163,9 +164,9 @@ async def test_a_return_is_heard_before_the_loss_however_late_it_is_read(hub: Me
     async with running(hub, recognition()), connect(hub=hub) as robot:
         events = await watched(hub, robot, hub.join("perception"))
         run = hub._buses["recognition"].run
-        hub.announce("recognition", PeerGone(participant="recognition"))
+        hub.announce(PeerGone(participant="recognition"))
         await asyncio.sleep(1.0)
-        hub.announce("recognition", PeerAlive(participant="recognition", run=run))
+        hub.announce(PeerAlive(participant="recognition", run=run))
         await asyncio.sleep(5.0)
 
         assert await told(events) == []

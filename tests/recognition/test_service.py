@@ -272,9 +272,9 @@ async def test_where_a_person_looks_is_known_again_once_perception_is_back(hub: 
         camera.publish(keys.WORLD, world())
         perceive(camera, "blue-square")
         await asyncio.sleep(1.0)
-        hub.announce("camera", PeerGone(participant="camera"))
+        hub.announce(PeerGone(participant="camera"))
         await asyncio.sleep(5.0)
-        hub.announce("camera", PeerAlive(participant="camera", run=camera.run))
+        hub.announce(PeerAlive(participant="camera", run=camera.run))
         await asyncio.sleep(1.0)
         outcome = await requests.send(keys.EVENT, request(bus, "directed_gaze", "blue-square")).outcome
 

@@ -13,9 +13,8 @@ from engage_hri.schemas.body import BehaviorOutcome, PerformBehavior
 from engage_hri.schemas.faults import EngageError, Fault, RunFailed
 from engage_hri.schemas.requests import Accepted, Answer, Cancel, KeepAlive, Outcome, Refused, Request, life_of
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.requests import asking_effects, serving_effects
-from engage_hri.services.requests.asking import Asking
-from engage_hri.services.requests.patience import Patience
+from engage_hri.services.requests import asking, serving
+from engage_hri.services.requests.asking import Asking, Patience
 from engage_hri.services.requests.serving import Serving
 
 if TYPE_CHECKING:
@@ -63,15 +62,15 @@ class Client:
             self.unanswered.discard(answer.id)
         self.carry_out(self.machine.hear(answer, self.world.now, "realizer"))
 
-    def carry_out(self, effects: list[asking_effects.Effect]) -> None:
+    def carry_out(self, effects: list[asking.Effect]) -> None:
         for effect in effects:
             match effect:
-                case asking_effects.PublishCommand(message=message):
+                case asking.PublishCommand(message=message):
                     self._publish(message)
-                case asking_effects.Renew(live=live):
+                case asking.Renew(live=live):
                     still = KeepAlive(live=live, at=Stamp("w", self.world.now), requester=self.name, life=self.life)
                     self.world.to_server(self, still)
-                case asking_effects.TellEnd(id=id, end=end):
+                case asking.TellEnd(id=id, end=end):
                     self.ends[id].append(end)
                     self.unanswered.discard(id)
                     if isinstance(end, RunFailed) and end.fault.cause == "gone":
@@ -101,21 +100,21 @@ class Server:
         self.content: dict[Asked, Request] = {}
         self.mistakes: list[Fault] = []
 
-    def carry_out(self, effects: list[serving_effects.Effect]) -> None:
+    def carry_out(self, effects: list[serving.Effect]) -> None:
         for effect in effects:
             match effect:
-                case serving_effects.PublishAnswer(answer=answer):
+                case serving.PublishAnswer(answer=answer):
                     self.world.to_clients(self, answer)
-                case serving_effects.Hand(request=Cancel() as cancel):
+                case serving.Hand(request=Cancel() as cancel):
                     whose = self.names[cancel.id][0]
                     assert whose not in self.stopped, "told to stop twice"
                     self.stopped.add(whose)
                     if cancel.cause == "unrenewed":
                         self.lapsed.append(whose)
                     self.stop(cancel.id)
-                case serving_effects.Hand(request=request):
+                case serving.Hand(request=request):
                     self.begin(request)
-                case serving_effects.ServingFault(fault=fault, is_ours=True):
+                case serving.ServingFault(fault=fault, is_ours=True):
                     self.mistakes.append(fault)
         self.world.wake(self.machine.deadline, self.tick)
 

@@ -13,9 +13,9 @@ from msgspec import structs
 from engage_hri.schemas.faults import EngageError, Fault, RunFailed
 from engage_hri.schemas.requests import Answer, Cancel, KeepAlive, Kept, Outcome, Refused, Request, kind_of
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.requests import asking, asking_effects
+from engage_hri.services.requests import asking
 from engage_hri.services.requests.asking import NeverEnded, RequestRefused
-from engage_hri.services.requests.serving_effects import ServingFault
+from engage_hri.services.requests.serving import ServingFault
 from tests.requests.request_ends import REQUESTS, Asked, Client, Server
 
 CALM = 150.0
@@ -200,7 +200,7 @@ class World:
         if is_new:
             client.asked.append(id)
         elif was is not None and type(was) is not type(request(id)):
-            assert isinstance(effects[0], asking_effects.TellEnd)  # refused by name, and the live one goes on
+            assert isinstance(effects[0], asking.TellEnd)  # refused by name, and the live one goes on
             return
         elif client.machine.state(id) is asking.AskingState.GIVEN_UP:
             return

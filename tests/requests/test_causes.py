@@ -11,11 +11,8 @@ from engage_hri.schemas.requests import Accepted, Cancel
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.sight import LATE, Sight
-from engage_hri.services.requests.asking import Asking
-from engage_hri.services.requests.asking_effects import Effect, PublishCommand, TellEnd
-from engage_hri.services.requests.patience import Patience
-from engage_hri.services.requests.serving import Serving
-from engage_hri.services.requests.serving_effects import Hand, HoldRequest
+from engage_hri.services.requests.asking import Asking, Effect, Patience, PublishCommand, TellEnd
+from engage_hri.services.requests.serving import Hand, HoldRequest, Serving
 
 PLEASE = PerformFragment(
     id="a", requester="me", life="1", lease=5.0,

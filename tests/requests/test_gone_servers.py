@@ -2,9 +2,7 @@
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, RequestRefused
-from engage_hri.services.requests.asking import Asking
-from engage_hri.services.requests.asking_effects import PublishCommand, TellEnd
-from engage_hri.services.requests.patience import Patience
+from engage_hri.services.requests.asking import Asking, Patience, PublishCommand, TellEnd
 from tests.bus.performer import block
 
 

@@ -15,13 +15,10 @@ from engage_hri.schemas.requests import Accepted, Cancel, Heard, KeepAlive, Kept
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.sight import LATE
-from engage_hri.services.requests.asking import Asking
-from engage_hri.services.requests.asking_effects import PublishCommand, Renew, TellEnd
+from engage_hri.services.requests.asking import Asking, Patience, PublishCommand, Renew, TellEnd
 from engage_hri.services.requests.ends import RequestDesk
-from engage_hri.services.requests.patience import Patience
-from engage_hri.services.requests.serving import Serving
-from engage_hri.services.requests.serving_effects import Hand, HoldRequest
-from engage_hri.services.requests.serving_effects import PublishAnswer as Answered
+from engage_hri.services.requests.serving import Hand, HoldRequest, Serving
+from engage_hri.services.requests.serving import PublishAnswer as Answered
 
 MOVES = PerformBehavior(
     id="a", requester="me", life="1", block="b", behavior=Wait(id="w"), through="start", lease=4.0, held_after=0.5

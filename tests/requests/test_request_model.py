@@ -13,8 +13,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.requests import Accepted, Heard, KeepAlive, Kept, Outdated, Refused
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.requests import asking_table, serving_table
-from engage_hri.services.requests.asking import Asking
-from engage_hri.services.requests.patience import Patience
+from engage_hri.services.requests.asking import Asking, Patience
 from engage_hri.services.requests.serving import Serving
 from tests.requests.request_world import World
 

@@ -266,9 +266,9 @@ async def test_a_short_absence_of_the_server_is_harmless(hub: MemoryHub):
     async with Requester(hub.join("client")) as requests:
         pending = requests.send(keys.BLOCK, block())
         await pending.accepted
-        hub.announce("realizer", PeerGone(participant="realizer"))
+        hub.announce(PeerGone(participant="realizer"))
         await asyncio.sleep(GRACE - 0.1)
-        hub.announce("realizer", PeerAlive(participant="realizer", run=server.bus.run))
+        hub.announce(PeerAlive(participant="realizer", run=server.bus.run))
 
         assert (await pending.outcome).id == "b"
 
@@ -300,9 +300,9 @@ async def test_a_requester_that_is_back_within_the_grace_keeps_its_requests(hub:
     client = hub.join("client")
     client.declare_alive()
     command(client, keys.BLOCK, block())
-    hub.announce("client", PeerGone(participant="client"))
+    hub.announce(PeerGone(participant="client"))
     await asyncio.sleep(GRACE - 0.001)
-    hub.announce("client", PeerAlive(participant="client", run=client.run))
+    hub.announce(PeerAlive(participant="client", run=client.run))
 
     await asyncio.sleep(2 * GRACE)
 

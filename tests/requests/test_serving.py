@@ -17,13 +17,9 @@ from engage_hri.schemas.requests import Accepted, Cancel, Heard, KeepAlive, Kept
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.payloads import read_payload
-from engage_hri.services.requests.asking import Asking, RequestRefused
-from engage_hri.services.requests.asking_effects import PublishCommand as AskedToPublish
-from engage_hri.services.requests.asking_effects import TellEnd
-from engage_hri.services.requests.names import Names
-from engage_hri.services.requests.patience import Patience
-from engage_hri.services.requests.serving import LIFELESS_KEPT, Serving
-from engage_hri.services.requests.serving_effects import Hand, PublishAnswer, ServingFault
+from engage_hri.services.requests.asking import Asking, Patience, RequestRefused, TellEnd
+from engage_hri.services.requests.asking import PublishCommand as AskedToPublish
+from engage_hri.services.requests.serving import LIFELESS_KEPT, Hand, Names, PublishAnswer, Serving, ServingFault
 from tests.bus.performer import Server
 from tests.commanding import key_of
 

@@ -88,7 +88,7 @@ async def test_of_two_services_with_one_name_that_started_at_once_one_is_refused
     serving = asyncio.create_task(serve(hub, "control", stand_late))
     await asyncio.sleep(3.0)
     run = "" if is_other_first else "~"
-    hub.announce("control", PeerAlive(participant="control", run=f"{run}0"))
+    hub.announce(PeerAlive(participant="control", run=f"{run}0"))
     await asyncio.sleep(0.1)
     assert serving.done() == is_other_first
     if is_other_first:

@@ -1,18 +1,11 @@
 """The grammars of BML 1.0 refuse what is not BML 1.0; what is, and what we write, they accept."""
 
-import re
-
 import pytest
 
 from engage_hri.schemas.behaviors import FaceShift, Mark, Speech, Timing
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
-from engage_hri.schemas.documents.xml_feedback import encode_feedback
-from engage_hri.schemas.feedback import PlannedPoint, PredictionFeedback, WarningFeedback
-from engage_hri.schemas.units import Stamp
-from tests.schemas.feedback_reader import decode_feedback
 from tests.schemas.grammar import violations
-from tests.schemas.test_feedback_xml import FORMS
 
 GAZE = '<gaze id="g" target="t"/>'
 
@@ -103,48 +96,3 @@ def test_markup_ties_of_marks_and_expressions_are_written_as_bml_1_0_has_them() 
     assert again.behaviors[0].timing == SPOKEN.behaviors[0].timing
     assert isinstance(again.behaviors[0], Speech)
     assert again.behaviors[0].markup == '<emphasis>One</emphasis> <mark name="m"/>two'
-
-
-FEEDBACK = "bml-1.0-feedback.rng"
-LATE = WarningFeedback(block="b", kind="LATE", message="x", at=Stamp("", 1.0))
-PREDICTION = PredictionFeedback(
-    block="b",
-    at=Stamp("", 1.0),
-    points=(
-        PlannedPoint(behavior="e", sync="start", time=0.0, type="event"),
-        PlannedPoint(behavior="s", sync="start", time=0.0, type="speech"),
-        PlannedPoint(behavior="s", sync="stroke", time=0.5, type="speech"),
-        PlannedPoint(behavior="s", sync="m-2", time=0.7, type="speech"),
-        PlannedPoint(behavior="s", sync="end", time=1.0, type="speech"),
-    ),
-)
-
-
-@pytest.mark.parametrize(
-    "message",
-    [*(message for message, _ in FORMS), PREDICTION, LATE],
-)  # fmt: skip
-def test_feedback_is_that_of_bml_1_0_and_reads_back(message: object) -> None:
-    written = encode_feedback(message)  # type: ignore[arg-type]
-
-    assert violations(written, FEEDBACK) == []
-    assert decode_feedback(written) == (message,)
-
-
-@pytest.mark.parametrize(
-    "form",
-    [
-        '<blockProgress id="b" globalTime="1"/>', '<blockProgress id="b:start"/>',
-        '<blockProgress id="b:stroke" globalTime="1"/>', '<blockProgress id="b:end" globalTime="1" status="done"/>',
-        '<syncPointProgress id="b:g:start" time="1"/>', '<syncPointProgress id="b:g" time="1" globalTime="1"/>',
-        '<predictionFeedback><bml id="b"/></predictionFeedback>', '<warningFeedback id="b" type="BORED"/>',
-        '<warningFeedback id="b" type="LATE" globalTime="1"/>', '<warningFeedback id="b"/>',
-        '<predictionFeedback><event id="b:e" start="1"/></predictionFeedback>',
-        '<predictionFeedback><gaze id="b:g" stroke_start="1"/></predictionFeedback>',
-        '<predictionFeedback><speech id="b:s" start="1" m="2"/></predictionFeedback>', '<progress id="b:start"/>',
-    ],
-)  # fmt: skip
-def test_what_is_not_feedback_of_bml_1_0_is_not(form: str) -> None:
-    xmlns = 'xmlns="http://www.bml-initiative.org/bml/bml-1.0"'
-
-    assert violations(re.sub("(?<=<)[A-Za-z]+", rf"\g<0> {xmlns}", form, count=1), FEEDBACK) != []

@@ -19,13 +19,11 @@ from engage_hri.schemas.utf8 import utf8
 from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.simulation.still import EXAMPLE, load_world
 from tests.random_cases import share_of
-from tests.schemas.feedback_reader import decode_feedback
 
 FORMS: dict[str, Callable[[Message], bytes]] = {"application/json": encode_json, "application/msgpack": encode}
 XML = b'<bml id="b">\n<speech id="s">caf\xc3\xa9 <sync id="m"/></speech><gaze id="g" target="cup" start="s:m"/></bml>'
 JSON = b'{"turn_status": "full",\n"parts": [{"say": "caf\xc3\xa9"}, {"refer": "cup"}]}'
 TOML = 'robot = "café"\n[realizer]\nlate = 0.5\n'.encode()
-FEEDBACK = b'<blockProgress xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b:start" globalTime="1.0"/>'
 
 
 @st.composite
@@ -79,7 +77,6 @@ READERS: dict[str, tuple[Callable[[bytes], Any], bytes]] = {
     "json": (lambda data: json_codec.read(data, "f"), JSON),
     "xml": (lambda data: json_codec.read(data, "f"), XML),
     "xml alone": (lambda data: decode_xml(data, "f"), XML),
-    "feedback": (decode_feedback, FEEDBACK),
 }
 
 

@@ -10,10 +10,11 @@ from engage_hri.schemas.documents.json_codec import decode_json, encode_json, re
 from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import disambiguated
+from tests.random_cases import share_of
 from tests.schemas.strategies import blocks, fragments, without_lines
 from tests.schemas.test_xml_codec import BML_1_0, DRAFT
 
-quick = settings(max_examples=40, suppress_health_check=[HealthCheck.too_slow], deadline=None)
+quick = settings(max_examples=share_of(40, 3), suppress_health_check=[HealthCheck.too_slow], deadline=None)
 
 
 @quick

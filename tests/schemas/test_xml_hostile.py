@@ -11,8 +11,7 @@ from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.blocks import Unread
 from engage_hri.schemas.documents import xml_decode
 from engage_hri.schemas.documents.json_codec import read
-from engage_hri.schemas.documents.xml_decode import decode_xml
-from engage_hri.schemas.documents.xml_notes import MOST
+from engage_hri.schemas.documents.xml_decode import MOST, decode_xml
 from engage_hri.schemas.faults import InputRefused
 from tests.random_cases import share_of
 from tests.schemas.test_xml_codec import BML_1_0, DRAFT, FRAGMENT, block, refused
@@ -34,13 +33,10 @@ LONG = b"""<bml id="b-1" xmlns="org.mindmakers.bml" composition="merge" characte
 
 @pytest.mark.parametrize(
     "wrong",
-    ["<x></y>", '<a b="1" b="2"/>', "&foo;", '<x xmlns:k="u" xmlns:l="u" k:a="1" l:a="2"/>', "<a b=1/>"],
+    ["<x></y>", '<a b="1" b="2"/>', "&foo;", '<x xmlns:k="u" xmlns:l="u" k:a="1" l:a="2"/>', "<a b=1/>", "<p:y/>"],
 )
-def test_only_undeclared_prefixes_are_forgiven(wrong: str) -> None:
-    many = "".join(f'<gaze id="g{number}" target="t"\n p{number % 90}:x="1"/>' for number in range(150)) + "<p1:y/>"
-    assert len(block(many).behaviors) == 150
-
-    fault = refused(f'<bml id="b">{many}{wrong}</bml>')
+def test_what_is_no_xml_is_refused_with_its_line(wrong: str) -> None:
+    fault = refused('<bml id="b">' + '<gaze id="g" target="t"\n x="1"/>' * 150 + f"{wrong}</bml>")
 
     assert fault.reason.startswith("malformed XML")
     assert fault.line == 151
@@ -48,12 +44,11 @@ def test_only_undeclared_prefixes_are_forgiven(wrong: str) -> None:
 
 @pytest.mark.parametrize(
     ("declared", "encoding"),
-    [("", "utf-8"), ("", "utf-8-sig"), ("", "utf-16"), ("UTF-16", "utf-16-le"), ("ISO-8859-1", "latin-1"),
-     ("windows-1252", "cp1252")],
-)  # fmt: skip
-def test_a_document_may_be_in_any_common_encoding(declared: str, encoding: str) -> None:
+    [("", "utf-8"), ("", "utf-8-sig"), ("", "utf-16"), ("UTF-16", "utf-16"), ("utf-8", "utf-8")],
+)
+def test_a_document_may_be_in_unicode(declared: str, encoding: str) -> None:
     declaration = f'<?xml version="1.0" encoding="{declared}"?>' if declared else ""
-    text = f'{declaration}\n<bml id="b"><speech id="s" undeclared:x="">café</speech></bml>'
+    text = f'{declaration}\n<bml id="b"><speech id="s">café</speech></bml>'
 
     (decoded,) = read(text.encode(encoding))
 
@@ -62,8 +57,8 @@ def test_a_document_may_be_in_any_common_encoding(declared: str, encoding: str) 
 
 @pytest.mark.parametrize(
     ("declared", "encoding"),
-    [("UTF-7", "utf-7"), ("klingon", "utf-8"), ("UTF-8", "latin-1"), ("UTF-16", "utf-8"), ("UTF-32", "utf-32"),
-     ("us-ascii", "latin-1"), ("IBM037", "cp037"), ("ISO-2022-JP", "ascii")],
+    [("UTF-7", "utf-7"), ("klingon", "utf-8"), ("UTF-8", "latin-1"), ("UTF-16", "utf-8"),
+     ("us-ascii", "latin-1"), ("ISO-8859-1", "latin-1"), ("IBM037", "cp037"), ("ISO-2022-JP", "ascii")],
 )  # fmt: skip
 def test_a_document_in_another_encoding_than_it_says_is_refused(declared: str, encoding: str) -> None:
     text = f'<?xml version="1.0" encoding="{declared}"?>\n<bml id="b"><speech id="s">café</speech></bml>'
@@ -155,8 +150,3 @@ def test_one_part_more_is_one_part() -> None:
     assert len(exactly) == MOST
     assert [each.kind for each in more[MOST:]] == ["BEHAVIOR_TYPE_NOT_SUPPORTED"] * 2
     assert too_many[MOST:] == (Unread(message="1 more part is ignored"),)
-
-
-def test_an_encoding_that_nobody_knows_is_refused_by_its_name() -> None:
-    with pytest.raises(InputRefused, match="encoding 'iso-8859-12' is not known"):
-        decode_xml(b'<?xml version="1.0" encoding="iso-8859-12"?><bml id="b"/>')

@@ -8,12 +8,14 @@ subscribers, repair of losses in a cut, the list of participants, and questions 
 """
 
 import asyncio
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from functools import partial
 from importlib.metadata import version
 from itertools import count
 from math import inf
-from typing import Any, TypeVar
+from pathlib import Path
+from typing import Any
 
 import msgspec
 import zenoh
@@ -25,7 +27,7 @@ from engage_hri.schemas.status import BusHealth, ProcessFacts
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.answering import Answering
 from engage_hri.services.bus.config import Mode, is_on_this_machine, mode_of
-from engage_hri.services.bus.interface import CAPACITY, LOG, Answer, Bus, Hub, Keep, Subscription, Tap
+from engage_hri.services.bus.interface import LOG, Answer, Bus, Hub, Subscription, Tap
 from engage_hri.services.bus.keyring import Keys
 from engage_hri.services.bus.zenoh.answers import Answers
 from engage_hri.services.bus.zenoh.clocks import Clocks
@@ -33,22 +35,56 @@ from engage_hri.services.bus.zenoh.expiry import Expiry
 from engage_hri.services.bus.zenoh.history import History, pack
 from engage_hri.services.bus.zenoh.links import Links
 from engage_hri.services.bus.zenoh.order import Envelope, SentLog, Written, mark_of
-from engage_hri.services.bus.zenoh.own_clock import own_clock
 from engage_hri.services.bus.zenoh.peers import Peers
-from engage_hri.services.bus.zenoh.publishers import Publishers
 from engage_hri.services.bus.zenoh.readers import Readers
 from engage_hri.services.bus.zenoh.rights import Rights, check_keys
 from engage_hri.services.bus.zenoh.session import (
     LOOPBACK,
     PEER_AFAR,
+    QOS,
     RENDEZVOUS,
     ROUTER_WITH_KEYS,
     RUST_PLACE,
+    STREAM_QOS,
     LoopBridge,
     open_client,
     open_session,
 )  # fmt: skip
 
+DECLARED = 256
+"""Number of keys that are declared at a time: people and clients come and go, each with keys of its own."""
+
+
+class Publishers:
+    """Publishers of a session, by key, declared as they are needed."""
+
+    def __init__(self, session: zenoh.Session) -> None:
+        self._session = session
+        self._declared: dict[str, zenoh.Publisher] = {}
+
+    def of(self, key: str, ordered: bool) -> zenoh.Publisher:
+        """Return the publisher of a key. ordered: False for a stream."""
+        publisher = self._declared.get(key)
+        if publisher is None:
+            if len(self._declared) >= DECLARED:
+                self.drop(next(iter(self._declared)))
+            qos = QOS if ordered else STREAM_QOS
+            publisher = self._session.declare_publisher(key, allowed_destination=zenoh.Locality.REMOTE, **qos)
+            self._declared[key] = publisher
+        return publisher
+
+    def drop(self, key: str) -> None:
+        """Take back the declaration of a key, if there is one."""
+        if (publisher := self._declared.pop(key, None)) is not None:
+            publisher.undeclare()  # type: ignore[no-untyped-call]
+
+    def close(self) -> None:
+        for key in tuple(self._declared):
+            self.drop(key)
+
+
+FIRST_TIME_SPACE = 0xEFFFFFFA
+"""Number of the time namespace that Linux begins with."""
 FIRST_PULSE: Seconds = 0.25
 NEXT_PULSE: Seconds = 1.0
 OPENING: Seconds = 0.5
@@ -59,9 +95,22 @@ POLL: Seconds = 0.05
 """Time between two looks for a first link."""
 VACANCY: Seconds = 4.0
 """Time that a dead participant may seem to be there: the lease of a silent link, and as long again."""
-Reader = TypeVar("Reader", Subscription, Tap)
 QUIET: Seconds = 0.25
 """Time without a change after which all peers are known, also those found through others."""
+
+
+def own_clock(loop: asyncio.AbstractEventLoop, run: str) -> tuple[str, Callable[[], Seconds]]:
+    """Name of the clock that loop time is, and how to read it: the machine's, one since boot, or the loop's own.
+
+    uvloop tells time in whole milliseconds, as of when its turn began: too coarse to measure by. A machine has more
+    than one such clock if its containers have time namespaces.
+    """
+    boot, space = Path("/proc/sys/kernel/random/boot_id"), Path("/proc/self/ns/time")
+    if abs(loop.time() - time.monotonic()) < 0.1 and boot.exists():
+        number = space.stat().st_ino if space.exists() else FIRST_TIME_SPACE
+        more = "" if number == FIRST_TIME_SPACE else f"-{number}"
+        return f"boot-{boot.read_text()[:8]}{more}", time.monotonic
+    return f"loop-{run[:8]}", loop.time
 
 
 async def open_hub(
@@ -312,9 +361,7 @@ class ZenohBus(Bus):
     def __init__(self, hub: ZenohHub, name: str, role: str) -> None:
         super().__init__(hub.robot, name, role, hub.clocks.own, hub.run, hub.life_numbers)
         self._hub = hub
-        self._subscriptions: list[Subscription | Tap] = []
         self.answers = Answers(self, hub.session, hub.bridge)
-        self._overflowed = 0
         self._token: Any = None
 
     @property
@@ -323,10 +370,9 @@ class ZenohBus(Bus):
 
     @property
     def health(self) -> BusHealth:
-        overflowed = self._overflowed + sum(subscription.overflowed for subscription in self._subscriptions)
         gaps, lost = self._hub.readers.missed(self)
         return msgspec.structs.replace(
-            self._hub.health, overflowed=overflowed, gaps=gaps, lost=lost, failures=self.failures
+            self._hub.health, overflowed=self.overflowed, gaps=gaps, lost=lost, failures=self.failures
         )
 
     def local(self, stamp: Stamp) -> Seconds:
@@ -346,29 +392,14 @@ class ZenohBus(Bus):
     def is_heard(self, key: str) -> bool:
         return self._hub.is_heard(key)
 
-    def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:
-        return self._attached(Subscription(patterns, keep, capacity, self._drop))
-
-    def tap(self, *patterns: str, capacity: int = CAPACITY) -> Tap:
-        return self._attached(Tap(patterns, capacity, self._drop))
-
-    def _attached(self, reader: Reader) -> Reader:
-        """Attach a reader. Raises InputRefused for a pattern that the keys do not allow."""
-        if self._gone:
-            reader.close()
-            return reader
+    def _attach(self, reader: Subscription | Tap) -> None:
         if self._hub.rights is not None:
             for pattern in reader.patterns:
                 self._hub.rights.check(self.name, "subscribes", pattern)
-        self._subscriptions.append(reader)
         self._hub.readers.attach(self, reader)
-        return reader
 
-    def _drop(self, subscription: Subscription | Tap) -> None:
-        if subscription in self._subscriptions:
-            self._subscriptions.remove(subscription)
-            self._overflowed += subscription.overflowed
-            self._hub.readers.detach(subscription)
+    def _detach(self, reader: Subscription | Tap) -> None:
+        self._hub.readers.detach(reader)
 
     async def _query(self, key: str, message: Message, deadline: Seconds) -> Message | None:
         if self._hub.rights is not None:
@@ -444,8 +475,8 @@ class ZenohBus(Bus):
         if self._gone:
             return
         self._gone = True
-        for subscription in list(self._subscriptions):
-            subscription.close()
+        for reader in tuple(self._readers):
+            reader.close()
         self.answers.close()
         if self._token is not None:
             self._token.undeclare()

@@ -1,6 +1,14 @@
-"""News of the router: one line when it is gone, and one when it is back."""
+"""Links of this process: news of the router, and those that Zenoh has forgotten.
+
+The router has one line when it is gone, and one when it is back. A link that Zenoh has forgotten still brings
+messages, and nothing is sent to its other end any more. When a link is full, each thread of Zenoh that waits for it
+ends it. The other process calls again at once, and a thread that is late then strikes the new link off the table of
+those to send to: Zenoh 1.10 strikes off whatever it has of that process. Nobody is told, so it stays like that
+(docs/decisions/0136-a-link-that-zenoh-has-forgotten.md).
+"""
 
 import asyncio
+import socket
 from collections.abc import Callable, Sequence
 from math import inf
 from typing import Any, NamedTuple
@@ -8,8 +16,8 @@ from typing import Any, NamedTuple
 import zenoh
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.zenoh.forgotten import Forgotten
 from engage_hri.services.bus.zenoh.session import LoopBridge
+from engage_hri.services.bus.zenoh.volume import end, place
 
 SETTLE: Seconds = 1.0
 """Time without a router after which that is told: a link that breaks is called again within half a second."""
@@ -153,3 +161,41 @@ class Links:
             return self._called[0]
         info: Any = self._session.info
         return next((str(link.dst) for link in info.links() if str(link.zid) == zid), "another machine")
+
+
+LOOK: Seconds = 0.5
+"""Time between two looks."""
+
+
+class Forgotten:
+    """Ends the links of this process that Zenoh has forgotten, so that they are opened anew, until it is closed."""
+
+    def __init__(self, session: zenoh.Session, tell: Callable[[str], None]) -> None:
+        """tell: called with a line for each link that is ended."""
+        self._info: Any = session.info
+        self._tell = tell
+        self._links: dict[str, tuple[tuple[str, str], str]] = {}
+        """Places of both ends of the link to each process, and how it is called. Zenoh does not tell of every end."""
+        self._loop = asyncio.get_running_loop()
+        self._timer = self._loop.call_later(LOOK, self._look)
+
+    def close(self) -> None:
+        self._timer.cancel()
+
+    def changed(self, event: zenoh.LinkEvent) -> None:
+        """Take a link that has come or gone."""
+        link = event.link
+        zid, places = str(link.zid), (place(str(link.src)), place(str(link.dst)))
+        if event.kind == zenoh.SampleKind.PUT:
+            self._links[zid] = (places, link.auth_identifier or f"process {zid}")
+        elif zid in self._links and self._links[zid][0] == places:
+            del self._links[zid]
+
+    def _look(self) -> None:
+        self._timer = self._loop.call_later(LOOK, self._look)
+        known = {str(transport.zid) for transport in self._info.transports()}
+        if gone := self._links.keys() - known:
+            lost = dict(self._links.pop(zid) for zid in gone)
+            # Only what comes is cut off: so Zenoh has done with the link before the other process calls again.
+            for places in end(lambda own, other: (own, other) in lost, socket.SHUT_RD):
+                self._tell(f"deaf: Zenoh sends {lost[places]} nothing any more; their link is opened anew")

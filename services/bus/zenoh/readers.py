@@ -12,13 +12,14 @@ import zenoh
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError, Fault
-from engage_hri.schemas.messages import Message, encode, encoding_of
+from engage_hri.schemas.messages import Message
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Unreadable
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import LOG, Bus, Received, Sample, Subscription, Tap
 from engage_hri.services.bus.payloads import read_payload
+from engage_hri.services.bus.subscription import offer_presence
 from engage_hri.services.bus.zenoh.history import BAD, PATTERNS, History, envelopes, finish, refuse
 from engage_hri.services.bus.zenoh.order import (
     Counts,
@@ -151,7 +152,7 @@ class Readers:
         self._readers.append(reader)
         for (part, name), runs in self._peers.participants.items():
             for run in sorted(runs):
-                self._offer_presence(reader, part, PeerAlive(participant=name, run=run))
+                offer_presence(subscription, part, PeerAlive(participant=name, run=run), self._loop.time())
         oldest = self._loop.time() - keys.HISTORY_MAX_AGE
         past = (log.past(subscription.wants, Missing(), oldest) for log in self._own.values())
         ours = [(written, run) for run, each in zip(self._own, past, strict=True) for written in each.written]
@@ -444,17 +445,7 @@ class Readers:
         message = PeerAlive(participant=name, run=run) if there else PeerGone(participant=name)
         journal.note_presence(message, self.viewer)
         for reader in self._readers:
-            self._offer_presence(reader, part, message)
-
-    def _offer_presence(self, reader: _Reader, part: keys.Part, message: PeerAlive | PeerGone) -> None:
-        key = keys.alive(message.participant, part)
-        if not reader.subscription.wants(key):
-            return
-        if isinstance(reader.subscription, Tap):
-            told = Written(key, encoding_of(message), encode(message), Envelope(message.participant, "", 0.0))
-            reader.subscription.offer(_sample(told, "", self._loop.time()))
-        else:
-            reader.subscription.offer(Received(key, message, message.participant, self._loop.time()))
+            offer_presence(reader.subscription, part, message, self._loop.time())
 
 
 def _sample(written: Written, run: str, now: Seconds, *, past: bool = False) -> Sample:

@@ -18,7 +18,7 @@ from engage_hri.services.bus.keyring import Keys
 from engage_hri.services.bus.zenoh.crowd import GOING, Crowd, Link
 from engage_hri.services.bus.zenoh.denials import LEVELS
 from engage_hri.services.bus.zenoh.expiry import Expiry
-from engage_hri.services.bus.zenoh.forgotten import Forgotten
+from engage_hri.services.bus.zenoh.links import Forgotten
 from engage_hri.services.bus.zenoh.rules import access_control
 from engage_hri.services.bus.zenoh.session import ROUTER_STALL_US, STALL, LoopBridge, encrypted, open_router
 from engage_hri.services.bus.zenoh.sizes import paced

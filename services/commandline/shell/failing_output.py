@@ -23,17 +23,15 @@ class Patient:
     the 100th, and how each of these ended. Only a reader that has gone (BrokenPipeError) is raised.
     """
 
-    def __init__(
-        self, name: str, put: Put, tell: Callable[[str], None], encoding: str = "utf-8", begin: str = ""
-    ) -> None:
-        """name: of the file, for people. begin: text before all else, which is never dropped."""
+    def __init__(self, name: str, put: Put, tell: Callable[[str], None], encoding: str = "utf-8") -> None:
+        """name: of the file, for people."""
         self.name = name
         self.encoding = encoding
         self.lost = 0
         """Number of lines that were dropped."""
         self._put = put
         self._tell = tell
-        self._unwritten = begin.encode(encoding)
+        self._unwritten = b""
         self._lost_before = 0
         """Number of lines that were lost before the present interruption."""
         self._interruptions = 0
@@ -102,7 +100,7 @@ class Patient:
 class PatientStream(Patient):
     """Patient standard output or error: the stream that Python has there when this is made."""
 
-    def __init__(self, name: str, stream: TextIO | None, begin: str = "", encoding: str = "") -> None:
+    def __init__(self, name: str, stream: TextIO | None, encoding: str = "") -> None:
         """stream: None stands for one that is closed; nothing is written then, and nothing lost.
 
         encoding: empty: the stream's own.
@@ -113,7 +111,7 @@ class PatientStream(Patient):
             return
         with suppress(OSError):
             stream.flush()
-        super().__init__(name, beneath(stream).write, LOG.warning, encoding or stream.encoding or "utf-8", begin)
+        super().__init__(name, beneath(stream).write, LOG.warning, encoding or stream.encoding or "utf-8")
 
     def isatty(self) -> bool:
         return self._stream is not None and self._stream.isatty()
@@ -129,12 +127,12 @@ def without_waiting(number: int, data: bytes) -> int | None:
 
 
 FORMAT = "utf-8"
-"""Encoding of a format, such as JSON and XML: its readers are programs, which know nothing of our terminal."""
+"""Encoding of a format, such as JSON: its readers are programs, which know nothing of our terminal."""
 
 
-def standard_output(begin: str = "", encoding: str = "") -> PatientStream:
+def standard_output(encoding: str = "") -> PatientStream:
     """Standard output for lines as they come. encoding: `FORMAT` for lines of a format; empty: the terminal's."""
-    return PatientStream("standard output", sys.stdout, begin, encoding)
+    return PatientStream("standard output", sys.stdout, encoding)
 
 
 def print_format(text: str) -> None:

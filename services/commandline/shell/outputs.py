@@ -1,18 +1,17 @@
-"""Files of `--events`, `--feedback` and `--outcomes`: JSON lines, or feedback as XML. `-` is standard output."""
+"""Files of `--events`, `--feedback` and `--outcomes`: JSON lines. `-` is standard output."""
 
 from collections.abc import Callable
 from contextlib import ExitStack
 from io import FileIO
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import msgspec
 from rich.console import Console
 
 from engage_hri.schemas import lines
-from engage_hri.schemas.documents.xml_feedback import HEAD, TAIL, encode_feedback
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
-from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.summary import Summary
@@ -28,7 +27,6 @@ from engage_hri.services.commandline.shell.failing_output import (
 )
 
 STDOUT = Path("-")
-FeedbackFormat = Literal["json", "xml"]
 
 
 class Terminal(Console):
@@ -49,21 +47,12 @@ class Outputs:
     """Sink that writes the public messages. A bad path is refused before anything starts.
 
     A disk that is full ends nothing: the end of `with` raises RunFailed with the number of lines that are lost.
-    format: of the feedback; None: that of its file's ending.
     """
 
-    def __init__(
-        self,
-        events: Path | None,
-        feedback: Path | None,
-        format: FeedbackFormat | None = None,
-        outcomes: Path | None = None,
-    ) -> None:
+    def __init__(self, events: Path | None, feedback: Path | None, outcomes: Path | None = None) -> None:
         self._paths = (events, feedback, outcomes)
         self.wanted: Callable[[Message], bool] = lambda message: True
         """Filter: True for the messages to write."""
-        named_xml = feedback is not None and feedback.suffix.lower() == ".xml"
-        self._is_xml = format == "xml" or (format is None and named_xml)
         self._files = ExitStack()
         self._events: Patient | None = None
         self._feedback: Patient | None = None
@@ -78,20 +67,14 @@ class Outputs:
 
     def __enter__(self) -> Self:
         events, feedback, outcomes = self._paths
-        if feedback is not None and feedback in (events, outcomes) and self._is_xml:
-            raise InputRefused(Fault(reason="JSON lines and XML cannot share a file", where=str(feedback)))
         files = {path: self._open(path) for path in dict.fromkeys(self._paths)}
         self._events, self._feedback, self._outcomes = files[events], files[feedback], files[outcomes]
         self._patients += [file for file in files.values() if file is not None]
-        if self._is_xml and self._feedback is not None:
-            self._feedback.write("")  # what it begins with
         return self
 
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         try:
             with self._files:
-                if self._is_xml and self._feedback is not None:
-                    self._feedback.write(TAIL)
                 settle(*self._patients)
         except (OSError, RunFailed, ExceptionGroup):
             if error is None:  # otherwise it is the same trouble once more
@@ -100,31 +83,27 @@ class Outputs:
     def _open(self, path: Path | None) -> Patient | None:
         if path is None:
             return None
-        begin = HEAD if self._is_xml and path == self._paths[1] else ""
         if path == STDOUT:
-            return standard_output(begin, FORMAT)
+            return standard_output(FORMAT)
         try:
             # Unbuffered, so that a reader that follows the file sees each line at once.
             file = self._files.enter_context(FileIO(path, "w"))
         except OSError as error:
             raise InputRefused(Fault(reason=f"cannot write: {error.strerror}", where=str(path))) from error
-        return Patient(str(path), file.write, LOG.warning, begin=begin)
+        return Patient(str(path), file.write, LOG.warning)
 
     def __call__(self, message: Message, at: Seconds) -> None:
         match message:
             case ConnectionEvent():
-                self._write(self._events, message, str(lines.line(message)))
+                self._write(self._events, message)
             case BlockProgress() | SyncPointProgress() | WarningFeedback():
-                text = encode_feedback(message, in_stream=True) if self._is_xml else str(lines.line(message))
-                self._write(self._feedback, message, text)
-            case PredictionFeedback() if self._is_xml:
-                self._write(self._feedback, message, encode_feedback(message, in_stream=True))
+                self._write(self._feedback, message)
 
     def outcome(self, fragment: str, outcome: Summary) -> None:
         if self._outcomes is not None:
             line = {"fragment": fragment, **msgspec.to_builtins(outcome)}
             self._outcomes.write(msgspec.json.encode(line).decode() + "\n")
 
-    def _write(self, file: Patient | None, message: Message, text: str) -> None:
+    def _write(self, file: Patient | None, message: Message) -> None:
         if file is not None and self.wanted(message):
-            file.write(text + "\n")
+            file.write(f"{lines.line(message)}\n")

@@ -1,7 +1,5 @@
 """Command `engage analyse`: recorded sessions in the tables of `engage simulate`."""
 
-import csv
-import io
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -188,20 +186,13 @@ def configured(sessions: Sequence[Session]) -> NumberTable:
 
 def settings(sessions: Sequence[Session]) -> str:
     """CSV of all settings of all services of all recordings."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("session", "condition", *COLUMNS))
-    for one in sessions:
-        writer.writerows((one.record.session, one.condition, *row) for row in rows(one.settings))
-    return text.getvalue()
+    found = ((one.record.session, one.condition, *row) for one in sessions for row in rows(one.settings))
+    return files.table(("session", "condition", *COLUMNS), found)
 
 
 def listed(sessions: Sequence[Session]) -> str:
     """CSV of the recordings: what `session` in the other files stands for."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("session", "condition", "file", "participant", "doubts"))
-    writer.writerows(
+    found = (
         (one.record.session, one.condition, one.path.name, one.participant, "; ".join(one.doubts)) for one in sessions
     )
-    return text.getvalue()
+    return files.table(("session", "condition", "file", "participant", "doubts"), found)

@@ -19,14 +19,15 @@ from engage_hri.schemas.status import AskStatus
 from engage_hri.schemas.units import A_DAY, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Hub
+from engage_hri.services.client.connection import connect
 from engage_hri.services.client.language_models import summary_of
-from engage_hri.services.client.robot import Robot, connect
+from engage_hri.services.client.robot import Robot
 from engage_hri.services.commandline.embedding import in_memory, services
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.exit_codes import readable
 from engage_hri.services.commandline.shell.failing_output import complain
 from engage_hri.services.commandline.shell.options import Connected, Embodied, Strict, VirtualTime, WorldFile, Written
-from engage_hri.services.commandline.shell.outputs import FeedbackFormat, Outputs, Terminal
+from engage_hri.services.commandline.shell.outputs import Outputs, Terminal
 from engage_hri.services.commandline.shell.process import DONE, FAILED, REFUSED, run, unique_name
 from engage_hri.services.commandline.shell.sources import InputFile, Thing, read_world, still
 from engage_hri.services.commandline.talk import input_check
@@ -56,9 +57,6 @@ class Options(Written, Embodied, Connected):
     at: Annotated[
         str | None,
         typer.Option(metavar="S,S,...", help="When to submit each file, seconds; else one after the other."),
-    ] = None
-    feedback_format: Annotated[
-        FeedbackFormat | None, typer.Option(help="Form of the feedback, whatever its file is called.")
     ] = None
     outcomes: Annotated[
         Path | None,
@@ -120,9 +118,7 @@ def main(options: Options) -> int:
         raise InputRefused(Fault(reason="--connect is for a running system", advice="leave out --embedded"))
     config = options.load()
     times = submission_times(options.at, len(options.files))
-    with Outputs(
-        options.events, options.feedback, format=options.feedback_format, outcomes=options.outcomes
-    ) as outputs:
+    with Outputs(options.events, options.feedback, options.outcomes) as outputs:
         world = read_world(options.world)
         sources = input_check.read_all(options.files, outputs)
         input_check.check(sources, world if options.embedded else None, config.robot, outputs)

@@ -7,15 +7,7 @@ from typing import Annotated
 import msgspec
 import typer
 
-from engage_hri.schemas.tool import (
-    MANY,
-    MOST_LETTERS,
-    MOST_LETTERS_IN_ALL,
-    MOST_VALUES,
-    Format,
-    tool_definition,
-    unlisted,
-)
+from engage_hri.schemas.tool import MOST_IDS, MOST_LETTERS, Format, is_listed, tool_definition
 from engage_hri.services.commandline.shell.failing_output import complain, print_format
 from engage_hri.services.commandline.shell.process import DONE
 from engage_hri.services.commandline.shell.sources import read_world
@@ -32,11 +24,10 @@ class Options:
 def main(options: Options) -> int:
     world = None if options.world is None else read_world(options.world)
     made = tool_definition(options.format, world)
-    if world is not None and (fields := unlisted(world)):
+    if world is not None and not is_listed(world):
         complain(
-            f"tool: {' and '.join(map(repr, fields))} take any text: the APIs take at most {MOST_VALUES} values and"
-            f" {MOST_LETTERS_IN_ALL} letters in all, and {MOST_LETTERS} letters in a list of more than {MANY}. What"
-            " is no id is refused when performed"
+            f"tool: ids are any text: the APIs take no list of more than {MOST_IDS} ids, or {MOST_LETTERS} letters."
+            " What is no id is refused when performed"
         )
     print_format(msgspec.json.format(msgspec.json.encode(made), indent=2).decode())
     return DONE

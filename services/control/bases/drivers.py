@@ -24,10 +24,9 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.explained import explained
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
-from engage_hri.services.control.bases.composed import composed
+from engage_hri.services.control.bases.composed import Member, composed
 from engage_hri.services.control.bases.driver_guard import GuardedBody
 from engage_hri.services.control.bases.error_place import seen_at, words_of
-from engage_hri.services.control.bases.members import Member
 from engage_hri.services.control.bases.offers import BODIES, VOICES, Offer, offers, unreadable
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.body import Body

@@ -165,7 +165,7 @@ class MovingParts(ABC, Generic[R]):
 
     @abstractmethod
     def rest_on(self, run: R | None) -> None:
-        """Have the head go home to the goal of a shift; None: to the safe pose."""
+        """Let the head go home to the goal of a shift; None: to the safe pose."""
 
     @abstractmethod
     def follow(self) -> None:

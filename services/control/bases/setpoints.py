@@ -24,8 +24,7 @@ import numpy as np
 
 from engage_hri.schemas.body import JointLimit
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.bases.one_part_body import Angles
-from engage_hri.services.control.bases.one_part_motion import OrdinaryBody
+from engage_hri.services.control.bases.one_part_motion import Angles, OrdinaryBody
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import JointMotion, Leg, Path, resting
 
@@ -33,7 +32,7 @@ from engage_hri.services.control.motion.path import JointMotion, Leg, Path, rest
 class SetPointBody(OrdinaryBody):
     """A robot with one part whose motors take set points: derive a driver from it.
 
-    What a driver says of its robot is in `DrivenBody`. `rate` is also the number of set points per second.
+    What a driver says of its robot is in `OrdinaryBody`. `rate` is also the number of set points per second.
     """
 
     rate = 100.0

@@ -1,8 +1,9 @@
 """Patience with joints that are not where they should be. Pure."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable
 
+import numpy as np
 from msgspec import Struct
 
 from engage_hri.schemas.faults import Fault
@@ -14,6 +15,8 @@ WAY: Radians = math.radians(0.3)
 """What counts as way; noise of the encoders does not."""
 ENOUGH = 8
 """Measurements without way that it takes at least."""
+SAMPLES = 6
+"""Places of a stretch that are looked at."""
 STANDS: Seconds = 0.25
 """Seconds without way after which a joint has come to stand, if it is short of patience."""
 
@@ -27,10 +30,18 @@ class Off(Struct, frozen=True):
     there: Radians
 
 
-def farthest(joints: Sequence[str], here: Sequence[float], there: Sequence[float], allowed: Sequence[float]) -> Off:
-    """The joint that is off by the greatest share of what is allowed."""
-    each = zip(joints, here, there, allowed, strict=True)
-    return max((Off(joint, abs(b - a) / limit, a, b) for joint, a, b, limit in each), key=lambda off: off.share)
+def farthest(rows: Iterable[tuple[str, Radians, Radians, Radians]]) -> Off:
+    """The joint that is off by the greatest share of what is allowed. rows: joint, here, there, allowed."""
+    return max((Off(joint, abs(b - a) / limit, a, b) for joint, a, b, limit in rows), key=lambda off: off.share)
+
+
+def nearest(since: Seconds, until: Seconds, off_at: Callable[[Seconds], Off]) -> Off:
+    """Measure how far joints are off the nearest place on a stretch of a path: they may have passed its beginning.
+
+    off_at: measures how far they are off one place.
+    """
+    places = np.linspace(since, until, SAMPLES).tolist() if until - since > 1e-9 else [since]
+    return min(map(off_at, places), key=lambda off: off.share)
 
 
 class Watch:

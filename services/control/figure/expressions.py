@@ -25,7 +25,7 @@ from engage_hri.services.control.figure.course import Course, Situation, angles,
 from engage_hri.services.control.figure.kinematics import Side
 from engage_hri.services.control.figure.pace import arm_time, moving_time, return_time
 from engage_hri.services.control.figure.repertoire import Absent, Found, GesturePath, HeadPath, Table
-from engage_hri.services.control.figure.table_lift import clear_of_table
+from engage_hri.services.control.figure.tracks import clear_of_table
 from engage_hri.services.control.motion.path import Leg
 from engage_hri.services.control.motion.points import WalkPoint, held_around_stroke, held_on_target
 

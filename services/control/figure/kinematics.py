@@ -49,14 +49,16 @@ SLIDE: Radians = radians(2.0)
 """Change of the shoulder pitch from stroke to stroke_end, the axis staying on target: it keeps the arm in motion."""
 
 
+def limit_in_degrees(joint: str, part: str, low: float, high: float, speed: float, acceleration: float) -> JointLimit:
+    """Limits of a joint, given in degrees, and per second and per second squared."""
+    low, high, speed, acceleration = map(radians, (low, high, speed, acceleration))
+    return JointLimit(joint=joint, part=part, low=low, high=high, speed=speed, acceleration=acceleration)
+
+
 def _joint(
     name: str, part: str, low: float, high: float, speed: float, acceleration: float, home: float = 0.0
 ) -> tuple[JointLimit, float]:
-    limit = JointLimit(
-        joint=name, part=part, low=radians(low), high=radians(high), speed=radians(speed),
-        acceleration=radians(acceleration),
-    )  # fmt: skip
-    return limit, radians(home)
+    return limit_in_degrees(name, part, low, high, speed, acceleration), radians(home)
 
 
 def _face_joint(name: str, low: float, speed: float = 25.0, acceleration: float = 3000.0) -> tuple[JointLimit, float]:
@@ -127,14 +129,26 @@ def pose_message(pose: Pose) -> BodyPose:
 
 def gaze(pose: Pose) -> Ray:
     """Gaze as a ray: from between the eyes along their axis."""
-    yaw, pitch, roll = pose["neck_yaw"], pose["neck_pitch"], pose["neck_roll"]
-    trunk, cos_yaw, sin_yaw, cos_pitch, sin_pitch = _trunk(pose), cos(yaw), sin(yaw), cos(pitch), sin(pitch)
+    trunk = _trunk(pose)
+    ahead, up = axes(pose["neck_yaw"], pose["neck_pitch"], pose["neck_roll"])
+    eyes = _add(NECK, _add(_scale(ahead, EYES_AHEAD), _scale(up, EYES_ABOVE)))
+    return Ray(origin=_to_world(eyes, trunk), axis=_turned(ahead, trunk))
+
+
+def axes(yaw: Radians, pitch: Radians, roll: Radians) -> tuple[Vector, Vector]:
+    """Axes of a head that is turned so, ahead and up."""
+    cos_yaw, sin_yaw, cos_pitch, sin_pitch = cos(yaw), sin(yaw), cos(pitch), sin(pitch)
     ahead = (cos_pitch * cos_yaw, cos_pitch * sin_yaw, sin_pitch)
     left = (-sin_yaw, cos_yaw, 0.0)
     up = (-sin_pitch * cos_yaw, -sin_pitch * sin_yaw, cos_pitch)
-    up = _add(_scale(up, cos(roll)), _scale(left, sin(roll)))
-    eyes = _add(NECK, _add(_scale(ahead, EYES_AHEAD), _scale(up, EYES_ABOVE)))
-    return Ray(origin=_to_world(eyes, trunk), axis=_turned(ahead, trunk))
+    return ahead, _add(_scale(up, cos(roll)), _scale(left, sin(roll)))
+
+
+def turned_to(x: Meters, y: Meters, z: Meters, above: Meters) -> tuple[float, float]:
+    """Yaw and pitch of a head whose axis runs through a place, seen from its pivot. above: of the axis over that."""
+    distance = hypot(x, y)
+    # So the pitch is a little less than the direction from the pivot.
+    return atan2(y, x), atan2(z, distance) - math.asin(above / max(hypot(distance, z), above))
 
 
 def arm(pose: Pose, side: Side) -> Ray:
@@ -163,10 +177,7 @@ def look_at(target: Vector, pose: Pose, reserve: Radians = 0.0) -> tuple[float, 
 
 def neck_angles(target: Vector, pose: Pose) -> tuple[float, float]:
     """Neck yaw and pitch whose gaze axis runs through `target`, whether the joints come there or not."""
-    x, y, z = _subtract(_to_torso(target, pose), NECK)
-    distance = hypot(x, y)
-    # The axis passes EYES_ABOVE the neck's pivot, so the pitch is a little less than the direction from the pivot.
-    return atan2(y, x), atan2(z, distance) - math.asin(EYES_ABOVE / max(hypot(distance, z), EYES_ABOVE))
+    return turned_to(*_subtract(_to_torso(target, pose), NECK), EYES_ABOVE)
 
 
 def arm_angles(side: Side, target: Vector, pitch: Radians, pose: Pose) -> tuple[float, float, float]:

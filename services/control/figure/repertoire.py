@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
 from importlib.resources import files
 from math import radians
+from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 import msgspec
@@ -19,7 +20,9 @@ from msgspec import Meta, Struct
 from engage_hri.schemas.behaviors import Hand
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Degrees
+from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.vocabulary import is_defined, normal
+from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.figure.kinematics import Side
 
@@ -158,18 +161,19 @@ class Repertoire:
             made._nearest[table] = dict(self._nearest[table])
         raw = _read(text, file)
         nearest = _table(raw.pop("nearest", {}), "nearest", file)
-        for name, content in raw.items():
-            table = _known(name, "", file)
-            for lexeme, value in _table(content, name, file).items():
-                made._paths[table][normal(lexeme)] = _value(value, table, f"{name}.{lexeme}", file)
-        for name, content in nearest.items():
-            table = _known(name, "nearest.", file)
-            for lexeme, value in _table(content, f"nearest.{name}", file).items():
-                key = f"nearest.{name}.{lexeme}"
-                if not isinstance(value, str):
-                    raise _refusal(f"the name of a lexeme is expected, not {value!r}", key, file)
-                made._nearest[table][normal(lexeme)] = normal(value)
-        made._check(raw, nearest, file)
+        own = [
+            (_known(name, prefix, file), normal(lexeme), value, f"{prefix}{name}.{lexeme}", bool(prefix))
+            for prefix, tables in (("", raw), ("nearest.", nearest))
+            for name, content in tables.items()
+            for lexeme, value in _table(content, f"{prefix}{name}", file).items()
+        ]
+        for table, lexeme, value, key, is_near in own:
+            if is_near and not isinstance(value, str):
+                raise _refusal(f"the name of a lexeme is expected, not {value!r}", key, file)
+            into = made._nearest if is_near else made._paths
+            into[table][lexeme] = _value(value, table, key, file)
+        for table, lexeme, value, key, is_near in own:
+            made._follow(table, normal(value) if is_near else lexeme, key, file)
         return made
 
     def find(self, table: Table, lexeme: str) -> Found:
@@ -228,17 +232,6 @@ class Repertoire:
         close = get_close_matches(normal(lexeme), known, n=3, cutoff=0.5) if table != "facs" else []
         there = f"do you mean {' or '.join(close)}?" if close else f"there are {', '.join(known)}."
         return f"{what}: {there} A repertoire file can add it: see docs/control.md"
-
-    def _check(self, raw: Mapping[str, Any], nearest: Mapping[str, Any], file: str) -> None:
-        """Check that the lexemes of a file lead to paths, and these are within the limits. Raises InputRefused."""
-        for name, content in raw.items():
-            table = _known(name, "", file)
-            for lexeme in content:
-                self._follow(table, normal(lexeme), f"{name}.{lexeme}", file)
-        for name, content in nearest.items():
-            table = _known(name, "nearest.", file)
-            for lexeme, near in content.items():
-                self._follow(table, normal(near), f"nearest.{name}.{lexeme}", file)
 
     def _follow(self, table: Table, lexeme: str, key: str, file: str) -> None:
         seen = [lexeme]
@@ -344,3 +337,16 @@ def _built_in() -> Repertoire:
 
 BUILT_IN = _built_in()
 """The repertoire that comes with the body."""
+
+
+def repertoire_of(config: ControlConfig) -> Repertoire:
+    """The repertoire with what the files of the configuration add to it. Raises InputRefused."""
+    return extended(BUILT_IN, [(file, _text_of(file)) for file in config.repertoire_files])
+
+
+def _text_of(file: str) -> str:
+    try:
+        return utf8(Path(file).read_bytes(), file)
+    except OSError as error:
+        advice = "it is in `control.repertoire`; a relative path counts from the folder of the process"
+        raise InputRefused(Fault(reason=error.strerror or str(error), where=file, advice=advice)) from error

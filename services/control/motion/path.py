@@ -32,8 +32,6 @@ SAMPLES = np.linspace(0.0, 1.0, 33)
 STRETCHES = tuple(1.1**step for step in range(40)) + tuple(0.9**step for step in range(1, 12))
 """Factors of a leg's natural duration, in the order in which they are tried."""
 
-FEW = 9
-"""Durations that are tried before all the others: most legs need few."""
 LEAST: Seconds = 0.02
 """Least time of a leg on which something moves."""
 RESTS = 8
@@ -72,11 +70,6 @@ class Leg(Struct, frozen=True, kw_only=True, gc=False):
     seconds: Seconds
     velocity: tuple[float, ...] = ()
     marks: tuple[tuple[str, float], ...] = ()
-
-
-def unmarked(legs: Sequence[Leg], sync: str) -> tuple[Leg, ...]:
-    """Legs without that mark."""
-    return tuple([replace(leg, marks=tuple([mark for mark in leg.marks if mark[0] != sync])) for leg in legs])
 
 
 class _Segment(Struct, frozen=True):
@@ -208,7 +201,6 @@ class Path:
         """The same path without that mark."""
         path = copy(self)
         path.marks = {each: s for each, s in self.marks.items() if each != sync}
-        path.legs = unmarked(self.legs, sync)
         return path
 
     @cached_property
@@ -255,51 +247,29 @@ class _Limits:
 
     def connect(self, start: JointMotion, end: JointMotion, seconds: Seconds) -> "_Connection":
         """The quintic between two states that takes `seconds`, or as near to it as keeps the limits."""
-        least = _NOTHINGS if seconds <= 0.0 else ()
         natural = max(seconds, LEAST)
-        tried = [*least, *(natural * stretch for stretch in STRETCHES)]
-        first = self._connected(start, end, tried[0])
-        if first.excess <= 0.0:
-            return first
-        # Many at once are seen in one product, to the last bit as each by itself has it.
-        excesses = [first.excess]
-        for portion in (tried[1:FEW], tried[FEW:]):
-            excesses += self._excesses(start, end, portion).tolist()
-            if (kept := next((number for number, excess in enumerate(excesses) if excess <= 0.0), 0)) > 0:
-                return self._connected(start, end, tried[kept])
-        return self._connected(start, end, tried[excesses.index(min(excesses))])
-
-    def _connected(self, start: JointMotion, end: JointMotion, seconds: Seconds) -> "_Connection":
-        return self._with_peaks(_quintic(start, end, seconds), seconds)
-
-    def _excesses(self, start: JointMotion, end: JointMotion, seconds: Sequence[Seconds]) -> Array:
-        """The excess of the quintic for each of these times."""
-        c = _quintics(start, end, seconds)
-        powers = np.power(np.array(seconds)[:, None, None] * SAMPLES[:, None], _POWERS)
-        velocity, change = (powers[..., :5] * _FIRST) @ c[:, 1:], (powers[..., :4] * _SECOND) @ c[:, 2:]
-        speed, acceleration, outside = self._peaks((powers @ c, velocity, change))
-        excess = np.maximum(speed / MARGIN - 1.0, acceleration / (MARGIN * SHARE) - 1.0)
-        return np.maximum(excess, outside - OUTSIDE)
+        best: _Connection | None = None
+        for each in (*(_NOTHINGS if seconds <= 0.0 else ()), *(natural * stretch for stretch in STRETCHES)):
+            made = self._with_peaks(_quintic(start, end, each), each)
+            if best is None or made.excess < best.excess:
+                best = made
+            if best.excess <= 0.0:
+                break
+        assert best is not None
+        return best
 
     def permits_brake(self, speeds: Array, brake: float) -> bool:
         """speeds: instants x joints."""
         return bool(np.all(np.abs(speeds) * brake <= (1 - SHARE) * self.acceleration))
 
     def _with_peaks(self, coefficients: Array, seconds: Seconds) -> "_Connection":
-        speed, acceleration, outside = self._peaks(_evaluated(coefficients, (SAMPLES * seconds)[:, None]))
+        """A quintic with its highest speed and acceleration, and how far it is outside, as shares of the limits."""
+        position, velocity, change = _evaluated(coefficients, (SAMPLES * seconds)[:, None])
+        outside = float((np.maximum(self.low - position, position - self.high) / (self.high - self.low)).max())
+        speed = float((np.abs(velocity) / self.speed).max())
+        acceleration = float((np.abs(change) / self.acceleration).max())
         excess = max(speed / MARGIN - 1.0, acceleration / (MARGIN * SHARE) - 1.0, outside - OUTSIDE)
-        return _Connection(coefficients, seconds, float(speed), float(acceleration), float(excess))
-
-    def _peaks(self, states: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
-        """Highest speed and acceleration, and how far it is outside: shares of the joints' limits and ranges.
-
-        states: positions, speeds and accelerations, each of instants x joints, or of many such at once.
-        """
-        position, velocity, change = states
-        outside = np.maximum(self.low - position, position - self.high) / (self.high - self.low)
-        shares = (np.abs(velocity) / self.speed, np.abs(change) / self.acceleration, outside)
-        speed, acceleration, outside = (share.max(axis=(-2, -1)) for share in shares)
-        return speed, acceleration, outside
+        return _Connection(coefficients, seconds, speed, acceleration, excess)
 
 
 class _Connection(Struct, frozen=True):
@@ -312,28 +282,18 @@ class _Connection(Struct, frozen=True):
     excess: float
 
 
-def _quintic(start: JointMotion, end: JointMotion, seconds: Seconds) -> Array:
-    """Coefficients of the polynomial of degree five that joins two states in `seconds`."""
+def _quintic(start: JointMotion, end: JointMotion, t: Seconds) -> Array:
+    """Coefficients of the polynomial of degree five that joins two states in the time t."""
+    h, t2 = end.q - start.q, t**2
     return np.array(
-        [start.q, start.v, start.a / 2, *_upper(start, end, seconds, seconds**2, seconds**3, seconds**4, seconds**5)]
-    )
-
-
-def _quintics(start: JointMotion, end: JointMotion, seconds: Sequence[Seconds]) -> Array:
-    """The same for each of these times: times x 6 x joints."""
-    # Powers as Python has them: numpy's may differ in the last bit.
-    columns = (np.array([each**power for each in seconds])[:, None] for power in range(1, 6))
-    lower = (np.broadcast_to(each, (len(seconds), len(each))) for each in (start.q, start.v, start.a / 2))
-    return np.stack((*lower, *_upper(start, end, *columns)), axis=1)
-
-
-def _upper(start: JointMotion, end: JointMotion, t: Any, t2: Any, t3: Any, t4: Any, t5: Any) -> tuple[Array, ...]:
-    """Coefficients of the third, fourth and fifth power. t, t2 ...: the time and its powers, numbers or columns."""
-    h = end.q - start.q
-    return (
-        (20 * h - (8 * end.v + 12 * start.v) * t - (3 * start.a - end.a) * t2) / (2 * t3),
-        (-30 * h + (14 * end.v + 16 * start.v) * t + (3 * start.a - 2 * end.a) * t2) / (2 * t4),
-        (12 * h - 6 * (end.v + start.v) * t + (end.a - start.a) * t2) / (2 * t5),
+        [
+            start.q,
+            start.v,
+            start.a / 2,
+            (20 * h - (8 * end.v + 12 * start.v) * t - (3 * start.a - end.a) * t2) / (2 * t**3),
+            (-30 * h + (14 * end.v + 16 * start.v) * t + (3 * start.a - 2 * end.a) * t2) / (2 * t**4),
+            (12 * h - 6 * (end.v + start.v) * t + (end.a - start.a) * t2) / (2 * t**5),
+        ]
     )
 
 

@@ -12,36 +12,30 @@ from contextlib import aclosing, asynccontextmanager
 from math import inf
 from pathlib import Path
 
-import msgspec
-import numpy as np
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Pointing
-from engage_hri.schemas.body import JointLimit, NoPointZone
-from engage_hri.schemas.body_faults import BodyFault
+from engage_hri.schemas.body import NoPointZone
+from engage_hri.schemas.body_faults import BodyFault, refuse
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.control.bases.watch import Off, Watch, farthest
+from engage_hri.services.control.bases.watch import Off, Watch, farthest, nearest
 from engage_hri.services.control.config import ControlConfig, Variability
 from engage_hri.services.control.contract.body import Body, BodyFailed, BodyState, MovementAuthority, Progress
 from engage_hri.services.control.contract.extras import Idle, Seen
 from engage_hri.services.control.figure import kinematics, tracks
-from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
-from engage_hri.services.control.figure.repertoire_files import repertoire_of
+from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire, repertoire_of
 from engage_hri.services.control.figure.tracks import PartTrack
 from engage_hri.services.control.motion.points import WalkPoint
 from engage_hri.services.control.mujoco.described import DescribedBody
-from engage_hri.services.control.mujoco.faults import KINDS, OURS, SHARED, refuse, told
+from engage_hri.services.control.mujoco.faults import KINDS, OURS, SHARED, told
 from engage_hri.services.control.mujoco.film import Frame, filming, framed
 from engage_hri.services.control.mujoco.pulse import TICK
 from engage_hri.services.control.mujoco.settings import MujocoSettings
-from engage_hri.services.control.mujoco.stage import Workbench
+from engage_hri.services.control.mujoco.stage import Workbench, as_measured
 from engage_hri.services.control.torso.body import SimulatedBody, seen_with
 from engage_hri.services.control.torso.runs import Run
-
-SAMPLES = 6
-"""Places of a plan between a sync point and where the plan is, at which the joints may be to have come there."""
-
 
 NEAR: Mapping[str, Radians] = {
     "head": math.radians(0.6), "nod": math.radians(0.6), "torso": math.radians(0.8), "left_arm": math.radians(1.5),
@@ -77,10 +71,10 @@ class MujocoBody(SimulatedBody):
         """
         super().__init__(zones, deviations, repertoire, alive=alive)
         self._settings = settings or MujocoSettings()
-        self.capabilities = msgspec.structs.replace(
-            self.capabilities, body="mujoco", joints=tuple(map(_as_measured, self.capabilities.joints)),
-            faults=KINDS, fault_kinds=told(OURS),
-        )  # fmt: skip
+        joints = tuple(as_measured(each, 1.3, 4.0) for each in self.capabilities.joints)
+        self.capabilities = replace(
+            self.capabilities, body="mujoco", joints=joints, faults=KINDS, fault_kinds=told(OURS)
+        )
         self.bench = Workbench(lambda now: tracks.pose_at(self.moves.tracks, now), self._look, self._settings.seed)
         self.pulse = self.bench.pulse
         self._watches: dict[Run, Watch] = {}
@@ -134,8 +128,8 @@ class MujocoBody(SimulatedBody):
         if (until := super().coming_home(going, watches)) is not None:
             return until
         now, names = self._loop.time(), [name for name in tracks.LIMITS if name != "nod" and name in going]
-        off = self._off(names, now)
-        if off is None or (off.share <= 1.0 and not self._are_moving(names)):
+        off = self._off_plan(names, now)
+        if off.share <= 1.0 and not self._are_moving(names):
             return None
         watches["home"].see(off, now)
         if off.share > 1.0 and watches["home"].is_stuck:
@@ -225,10 +219,10 @@ class MujocoBody(SimulatedBody):
 
     def _govern(self, run: Run, now: Seconds) -> None:
         """Let the plan of a run wait while its joints lag, and go on when they have come along."""
-        off = self._off(run.course.parts, now, LAG)
+        off = self._off_plan(run.course.parts, now, LAG)
         awaited = self._awaiting.get(run)
         watch = self._watches.get(run)
-        if off is None or (awaited is None and off.share < (1.0 if watch is None else 0.5)):
+        if awaited is None and off.share < (1.0 if watch is None else 0.5):
             if watch is not None:
                 del self._watches[run]
                 run.gate = inf
@@ -280,62 +274,43 @@ class MujocoBody(SimulatedBody):
         if watch is not None and watch.is_stuck and not run.is_over:
             raise BodyFailed(self._stuck(run.behavior.id, watch))
 
-    def _off(self, parts: Iterable[str], now: Seconds, allowed: Mapping[str, float] = NEAR) -> Off | None:
-        """The joint of these parts that is farthest off its plan; None: they have no motors."""
-        joints, here, there, limits = [], [], [], []
-        measured = self.bench.measured
-        for part in parts:
-            track = self.moves.tracks[part]
-            others = self._others(track, now)
-            for joint, angle in zip(track.joints, track.angles(now), strict=True):
-                if joint in measured:
-                    joints.append(joint)
-                    here.append(measured[joint] - others.get(joint, 0.0))
-                    there.append(angle)
-                    limits.append(allowed[part])
-        return farthest(joints, here, there, limits) if joints else None
+    def _off(self, there: Mapping[str, Sequence[float]], now: Seconds, allowed: Mapping[str, float] = NEAR) -> Off:
+        """The joint that is farthest off angles of these tracks; none is off if they have no motors."""
+        rows = [
+            (joint, self.bench.measured[joint] - self._others(track, now).get(joint, 0.0), angle, allowed[name])
+            for name, angles in there.items()
+            for track in [self.moves.tracks[name]]
+            for joint, angle in zip(track.joints, angles, strict=True)
+            if joint in self.bench.measured
+        ]
+        return farthest(rows) if rows else Off("", 0.0, 0.0, 0.0)
+
+    def _off_plan(self, names: Iterable[str], now: Seconds, allowed: Mapping[str, float] = NEAR) -> Off:
+        return self._off({name: self.moves.tracks[name].angles(now) for name in names}, now, allowed)
 
     def _off_point(self, run: Run, point: WalkPoint, now: Seconds) -> Off:
         """Measure how far the joints of a run are off a sync point, or off the nearest place behind it.
 
         A look that has waited and followed its target is to be where that has led it.
         """
-        has_followed = run.holding and any(
-            self.moves.tracks[part].motion is not run.motion for part in run.course.parts
-        )
-        if has_followed and (off := self._off(run.course.parts, now)) is not None:
-            return off
+        if run.holding and any(self.moves.tracks[name].motion is not run.motion for name in run.course.parts):
+            return self._off_plan(run.course.parts, now)
         path, s = run.motion.path, run.motion.s(now)
         mark = path.marks.get(point.sync, s)
         later = [path.marks[each.sync] for each in run.pending if path.marks.get(each.sync, 0.0) > mark + 1e-9]
-        until = max(mark, min([s, *later[:1]]))
-        places = [mark] if until - mark < 1e-9 else np.linspace(mark, until, SAMPLES).tolist()
         if run.holding:
-            places = [s]  # Its target may have moved: it is there once the plan is, and the joints are where that is.
-        offs = [self._off_at(run, place, now) for place in places]
-        return min(offs, key=lambda off: off.share)
+            mark = s  # Its target may have moved: it is there once the plan is, and the joints are where that is.
+        return nearest(mark, max(mark, min([s, *later[:1]])), lambda place: self._off_at(run, place, now))
 
-    def _off_at(self, run: Run, s: float, now: Seconds) -> Off:
+    def _off_at(self, run: Run, s: Seconds, now: Seconds) -> Off:
         """Measure how far the joints of a run are off a place on its path."""
-        q, column = run.motion.path.at(s).q, 0
-        joints: list[str] = []
-        here: list[float] = []
-        there: list[float] = []
-        limits: list[float] = []
-        measured = self.bench.measured
-        for part in run.course.parts:
-            track = self.moves.tracks[part]
-            angles = q[column : column + len(track.joints)]
-            column += len(track.joints)
+        q, there = run.motion.path.at(s).q, {}
+        for track in (self.moves.tracks[name] for name in run.course.parts):
+            angles, q = q[: len(track.joints)], q[len(track.joints) :]
             if track.aim is not None and not track.is_still(now, track.aim):
                 angles = track.aim.within(angles + track.aim.offset(track.trunk.angles(now)))
-            others = self._others(track, now)
-            for joint, angle in zip(track.joints, angles.tolist(), strict=True):
-                joints.append(joint)
-                there.append(angle)
-                here.append(measured[joint] - others.get(joint, 0.0) if joint in measured else angle)
-                limits.append(NEAR[part])
-        return farthest(joints, here, there, limits)
+            there[track.name] = angles.tolist()
+        return self._off(there, now)
 
     def _others(self, track: PartTrack, now: Seconds) -> dict[str, float]:
         """Angles that the other track of the head adds to the joints of this one."""
@@ -346,23 +321,10 @@ class MujocoBody(SimulatedBody):
 
     def _rests_on(self, looked: str) -> bool:
         """True if the measured eyes are where the plan has them."""
-        off = self._off(("head", "torso"), self._loop.time()) if looked else None
-        return off is None or off.share < 2.0
+        return not looked or self._off_plan(("head", "torso"), self._loop.time()).share < 2.0
 
     def _stuck(self, where: str, watch: Watch) -> Fault:
         """Describe joints that do not come: which one, how far it is off, and what is known of its motor."""
         fault = watch.fault(where)
         known = self.bench.suspicion(watch.off.joint) if watch.off is not None else ""
-        return msgspec.structs.replace(fault, reason=f"{fault.reason}: {known}") if known else fault
-
-
-def _as_measured(limit: JointLimit) -> JointLimit:
-    """Limits of what is measured of a joint that follows a plan: it swings a little beyond."""
-    if limit.part == "face":
-        return limit
-    from engage_hri.services.control.mujoco.model import SLACK
-
-    return msgspec.structs.replace(
-        limit, low=limit.low - SLACK, high=limit.high + SLACK, speed=1.3 * limit.speed,
-        acceleration=4.0 * limit.acceleration,
-    )  # fmt: skip
+        return replace(fault, reason=f"{fault.reason}: {known}") if known else fault

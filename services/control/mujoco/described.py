@@ -13,15 +13,14 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Pointing, Wait
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem
-from engage_hri.schemas.body_faults import BodyFault
+from engage_hri.schemas.body_faults import BodyFault, refuse
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.control.bases.composed import ComposedBody
-from engage_hri.services.control.bases.members import Member
+from engage_hri.services.control.bases.composed import ComposedBody, Member
 from engage_hri.services.control.contract.body import Body, MovementAuthority, Progress
 from engage_hri.services.control.figure.estimates import wait_estimate
 from engage_hri.services.control.mujoco.description import ArmDescription, Description, read
-from engage_hri.services.control.mujoco.faults import OURS, refuse, told
+from engage_hri.services.control.mujoco.faults import OURS, told
 from engage_hri.services.control.mujoco.film import Frame, filming, framed
 from engage_hri.services.control.mujoco.ik import Chain
 from engage_hri.services.control.mujoco.limbs import ArmLimb, HeadLimb, Limb
@@ -29,7 +28,7 @@ from engage_hri.services.control.mujoco.motors import Motor
 from engage_hri.services.control.mujoco.physics import Physics
 from engage_hri.services.control.mujoco.robot import PREFIX, assembled
 from engage_hri.services.control.mujoco.settings import MujocoSettings
-from engage_hri.services.control.mujoco.stage import DescribedStage, limits_of
+from engage_hri.services.control.mujoco.stage import DescribedStage, as_measured, limits_of
 from engage_hri.services.control.voice import speaking
 from engage_hri.services.runtime.steps import Steps
 from engage_hri.services.tangram.table import tangram_table
@@ -37,8 +36,6 @@ from engage_hri.services.tangram.table import tangram_table
 HEAD_TYPES = ("gaze", "gazeShift", "headDirectionShift", "head")
 FAULTS = tuple(kind for kind in OURS if kind not in ("blocked", "table"))
 """Kinds of faults that a described robot plays."""
-MEASURED_SPEED, MEASURED_ACCELERATION, SLACK = 1.4, 6.0, math.radians(1.5)
-"""What is measured of a joint, as multiples of what is planned, and beyond its range."""
 
 
 class DescribedBody(ComposedBody):
@@ -149,14 +146,7 @@ def _limbs(described: Description, stage: DescribedStage) -> list[Limb]:
 
 
 def _capabilities(described: Description, stage: DescribedStage, of_parts: Capabilities) -> Capabilities:
-    joints = tuple(
-        replace(
-            limit, low=limit.low - SLACK, high=limit.high + SLACK, speed=MEASURED_SPEED * limit.speed,
-            acceleration=MEASURED_ACCELERATION * limit.acceleration,
-        )
-        for own in stage.limits.values()
-        for limit in own
-    )  # fmt: skip
+    joints = tuple(as_measured(limit, 1.4, 6.0) for own in stage.limits.values() for limit in own)
     return replace(
         of_parts,
         body=described.name,

@@ -8,9 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.body import Capabilities, FaultKind
+from engage_hri.schemas.body import FaultKind
 from engage_hri.schemas.body_faults import BodyFault
-from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Vector
 from engage_hri.services.control.mujoco.model import AWAY, OBSTACLES
 from engage_hri.services.control.mujoco.motors import WARM, Condition, Motor
@@ -64,29 +63,6 @@ KINDS = (*SHARED, *OURS)
 def told(kinds: Iterable[str]) -> tuple[FaultKind, ...]:
     """Tell what some of our kinds do, for `Capabilities.fault_kinds`."""
     return tuple(replace(OURS[kind], kind=kind) for kind in kinds)
-
-
-def refuse(faults: Iterable[BodyFault], body: Capabilities) -> None:
-    """Raise InputRefused if the body cannot play one of these faults, of kinds that the physics plays."""
-    for fault in faults:
-        known = fault.kind in OURS and fault.kind in body.faults
-        reason = flaw(fault, body) if known else f"this body cannot play {fault.kind!r}"
-        if reason:
-            advice = "" if known else f"it can play {', '.join(body.faults)}"
-            raise InputRefused(Fault(reason=reason, where=fault.kind, advice=advice, service="control"))
-
-
-def flaw(fault: BodyFault, body: Capabilities) -> str:
-    """Say why the body cannot play a fault of a kind in `OURS`; empty: it can."""
-    kind = OURS[fault.kind]
-    if fault.before or fault.behavior:
-        return f"{fault.kind} takes no before and no behavior here: physics does not know them; switch it on in time"
-    if fault.amount is not None and not (kind.amount and kind.low <= fault.amount <= kind.high):
-        expected = f"{kind.low:g}..{kind.high:g} ({kind.amount})" if kind.amount else "none"
-        return f"the amount of {fault.kind} is {fault.amount:g}: expected {expected}"
-    if fault.part and fault.part not in (known := _known(kind, body)):
-        return f"{fault.kind} of {fault.part!r}: known are {', '.join(known) or 'none'}"
-    return ""
 
 
 def conditions(
@@ -153,12 +129,3 @@ def _worse(condition: Condition, fault: BodyFault, motor: Motor) -> Condition:
         case "miscalibrated":
             return replace(condition, offset=-math.radians(amount(fault)))
     return condition
-
-
-def _known(kind: FaultKind, body: Capabilities) -> tuple[str, ...]:
-    if not kind.on:
-        return ()
-    if kind.parts:
-        return kind.parts
-    limits = [limit for limit in body.joints if limit.part != "face"]
-    return (*dict.fromkeys(limit.part for limit in limits), *(limit.joint for limit in limits))

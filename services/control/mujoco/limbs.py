@@ -9,11 +9,10 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Head, Pointing
 from engage_hri.schemas.body import BodyPose, Estimate, JointLimit, Ray
-from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Meters, Radians, Seconds, Vector
 from engage_hri.schemas.world import World
-from engage_hri.services.control.bases.one_part_motion import OrdinaryBody, Way
+from engage_hri.services.control.bases.one_part_motion import OrdinaryBody, Way, refused
 from engage_hri.services.control.contract.bell import Bell
 from engage_hri.services.control.contract.body import (
     BehaviorRefused,
@@ -169,16 +168,11 @@ class Limb(OrdinaryBody):
         """Angles on a target, each time a mapping of their own. Raises BehaviorRefused: it finds none."""
         found = self.solved(target, self._home, floor, distance)
         if found.low > 2e-3:
-            raise self.refused(
-                behavior, f"the {self.part} finds no way to it: the table is in the way, or it is too near"
-            )
+            raise refused(behavior, f"the {self.part} finds no way to it: the table is in the way, or it is too near")
         if found.off > ON_AXIS:
             off = math.degrees(found.off)
-            raise self.refused(behavior, f"the {self.part} comes no nearer than {off:.1f} degrees to it")
+            raise refused(behavior, f"the {self.part} comes no nearer than {off:.1f} degrees to it")
         return dict(found.angles)
-
-    def refused(self, behavior: BlockBehavior, reason: str) -> BehaviorRefused:
-        return BehaviorRefused(Fault(reason=reason, where=behavior.id, service="control"))
 
 
 class HeadLimb(Limb):
@@ -194,7 +188,7 @@ class HeadLimb(Limb):
             return super().way(behavior, world)
         turn = NODS.get(behavior.lexeme.upper())
         if turn is None:
-            raise self.refused(behavior, f"this head has no {behavior.lexeme!r}: it has {', '.join(NODS)}")
+            raise refused(behavior, f"this head has no {behavior.lexeme!r}: it has {', '.join(NODS)}")
         for share in SHARES[:-1]:
             with suppress(BehaviorRefused):
                 return self._nod(behavior, turn, share)
@@ -254,9 +248,9 @@ class ArmLimb(Limb):
             "",
             f"{self.part.removesuffix('_arm').upper()}_HAND",
         ):
-            raise self.refused(behavior, f"it is to be done with {behavior.mode!r}")
+            raise refused(behavior, f"it is to be done with {behavior.mode!r}")
         if (away := math.dist(self.axis(self.rest).origin, target)) > self.reach:
-            raise self.refused(behavior, f"it is {away:.2f} m away, farther than its reach of {self.reach:g} m")
+            raise refused(behavior, f"it is {away:.2f} m away, farther than its reach of {self.reach:g} m")
         distance = HAND_TO_TARGET + (entity.radius if entity is not None else 0.0)
         return self.solve(behavior, target, floor=TABLE_TOP + OVER_THE_TABLE, distance=distance)
 

@@ -36,11 +36,10 @@ STEPS_AT_ONCE = 50
 
 
 class Contact(Struct, frozen=True):
-    """A contact of the robot with a thing: the names of both geoms. depth: metres."""
+    """A contact of the robot with a thing: the names of both geoms."""
 
     robot: str
     thing: str
-    depth: float
 
 
 class Physics:
@@ -151,7 +150,7 @@ class Physics:
             if self.model.geom_contype[one] != 1:
                 one, other = other, one
             if self.model.geom_contype[one] == 1:
-                found.append(Contact(self.model.geom(one).name, self.model.geom(other).name, -float(each.dist)))
+                found.append(Contact(self.model.geom(one).name, self.model.geom(other).name))
         return found
 
     def complaints(self, joint: str) -> list[str]:

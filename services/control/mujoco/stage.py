@@ -3,23 +3,63 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from math import cos, sin
 
 import mujoco
 import numpy as np
+from msgspec.structs import replace
 
 from engage_hri.schemas.body import JointLimit
 from engage_hri.schemas.body_faults import BodyFault
-from engage_hri.schemas.units import Radians, Seconds
+from engage_hri.schemas.units import Meters, Radians, Seconds, Vector
+from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.figure.kinematics import LIMIT
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import Leg, Path
 from engage_hri.services.control.motion.track import Place, Track
 from engage_hri.services.control.mujoco import faults, model
 from engage_hri.services.control.mujoco.description import Description, PartDescription
+from engage_hri.services.control.mujoco.model import THICKNESS
 from engage_hri.services.control.mujoco.physics import Array, Contact, Physics
 from engage_hri.services.control.mujoco.pulse import Pulse
-from engage_hri.services.control.mujoco.room import Room
 from engage_hri.services.tangram.table import tangram_table
+
+MOVED: Meters = 0.01
+"""A piece that the world has this much elsewhere than before was moved by somebody."""
+
+
+class Room:
+    """The pieces on the table. rise: metres by which the table is higher than it seems."""
+
+    def __init__(self, physics: Physics) -> None:
+        self._physics = physics
+        self._pieces = [piece.id for piece in tangram_table().pieces]
+        self._seen: dict[str, Vector] = {}
+        self.rise: Meters = 0.0
+
+    def lay(self, world: World) -> None:
+        """Lay the pieces where the world has them, as far as that has moved them since."""
+        for entity in world.entities:
+            before = self._seen.get(entity.id)
+            if entity.id in self._pieces and (before is None or math.dist(before, entity.position) > MOVED):
+                self._seen[entity.id] = entity.position
+                self._put(entity)
+        mujoco.mj_forward(self._physics.model, self._physics.data)
+
+    def lift(self, rise: Meters) -> None:
+        """Lift the pieces with the table."""
+        for piece in self._pieces:
+            self._physics.data.joint(piece).qpos[2] += rise - self.rise
+        self.rise = rise
+        mujoco.mj_forward(self._physics.model, self._physics.data)
+
+    def _put(self, entity: Entity) -> None:
+        joint = self._physics.data.joint(entity.id)
+        x, y, z = entity.position
+        half = entity.yaw / 2
+        joint.qpos[:] = (x, y, z + self.rise + THICKNESS / 2, cos(half), 0.0, 0.0, sin(half))
+        joint.qvel[:] = 0.0
+
 
 Angles = Mapping[str, Radians]
 
@@ -160,6 +200,19 @@ class DescribedStage(Stage):
 
     def is_at_rest(self, now: Seconds) -> bool:
         return not any(track.is_moving(now) for track in self._tracks.values()) and super().is_at_rest(now)
+
+
+def as_measured(limit: JointLimit, speed: float, acceleration: float) -> JointLimit:
+    """Limits of what is measured of a joint that follows a plan: it swings a little beyond.
+
+    speed, acceleration: as multiples of what is planned. The face is a screen, and is there.
+    """
+    if limit.part == "face":
+        return limit
+    low, high = limit.low - model.SLACK, limit.high + model.SLACK
+    return replace(
+        limit, low=low, high=high, speed=speed * limit.speed, acceleration=acceleration * limit.acceleration
+    )  # fmt: skip
 
 
 def limits_of(

@@ -84,7 +84,8 @@ class ReachyMini(LinkedBody, WalkingBody[Run]):
             moves.stand(self.last_frame)
         moves.correct(now)
         commanded = moves.commanded(now)
-        added = self._idling.added(now, commanded, moves.busy(now))
+        busy = {name for name, track in moves.tracks.items() if name in moves.runs or track.is_moving(now)}
+        added = self._idling.added(now, commanded, busy)
         text = messages.target({joint: angle + added.get(joint, 0.0) for joint, angle in commanded.items()})
         before, self._sent = self._sent, text
         return text if text != before else None

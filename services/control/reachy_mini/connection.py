@@ -94,12 +94,7 @@ _ADVICE = (
 
 
 def _unreachable(url: str, error: BaseException) -> Fault:
-    words = " ".join(str(error).split()) or type(error).__name__
-    if isinstance(error, TimeoutError):
-        words = "no answer"
-    elif isinstance(error, aiohttp.ClientConnectorError):
-        is_closed = isinstance(error.os_error, ConnectionRefusedError)
-        words = "nothing listens there" if is_closed else error.os_error.strerror or words
+    words = "no answer" if isinstance(error, TimeoutError) else " ".join(str(error).split()) or type(error).__name__
     return Fault(reason=f"the daemon at {url} cannot be reached: {words}", advice=_ADVICE)
 
 

@@ -6,7 +6,6 @@ in, the antennas to any behavior of the face. Its own time goes on with the meas
 """
 
 from collections import deque
-from collections.abc import Iterable
 from math import inf, radians, sin, tau
 
 from engage_hri.schemas.units import Radians, Seconds
@@ -45,7 +44,7 @@ class Idling:
         self._read: dict[str, Radians] = {}
         self.shown: dict[str, Radians] = {}
 
-    def added(self, now: Seconds, planned: Angles, busy: Iterable[str]) -> dict[str, Radians]:
+    def added(self, now: Seconds, planned: Angles, busy: set[str]) -> dict[str, Radians]:
         """Tell what to add to the joints now, and take it as sent.
 
         planned: angles that they are sent to without it. busy: tracks that move, or that a behavior has.
@@ -54,9 +53,8 @@ class Idling:
             return {}
         self._time += min(LONGEST, now - self._seen) if self._seen is not None else 0.0
         self._seen = now
-        tracks = set(busy)
-        of_face = self._face.share(self._time, is_open="face" not in tracks)
-        of_body = self._body.share(self._time, is_open=not tracks - {"face"})
+        of_face = self._face.share(self._time, is_open="face" not in busy)
+        of_body = self._body.share(self._time, is_open=not busy - {"face"})
         angle = tau * self._time / BREATH
         found = {"body_lean": of_body * LEAN * sin(angle + 0.4 * sin(angle))}  # in is quicker than out
         for joint, (one, other) in PERIODS.items():

@@ -16,6 +16,8 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.body import BodyPose, JointAngle, JointLimit, Ray
 from engage_hri.schemas.units import Meters, Radians, Vector
+from engage_hri.services.control.figure import kinematics
+from engage_hri.services.control.figure.kinematics import limit_in_degrees
 
 ASIDE = radians(30.0)
 """A head that looks further aside than this of the body's direction takes the body along."""
@@ -35,30 +37,22 @@ EYES_ABOVE: Meters = 0.0525
 Angles = Mapping[str, Radians]
 
 
-def _joint(name: str, part: str, low: float, high: float, speed: float, acceleration: float) -> JointLimit:
-    """Limits in degrees, and per second and per second squared."""
-    return JointLimit(
-        joint=name, part=part, low=radians(low), high=radians(high), speed=radians(speed),
-        acceleration=radians(acceleration),
-    )  # fmt: skip
-
-
-_TURN = _joint("body_turn", "torso", -25, 25, 60, 300)
-_LEAN = _joint("body_lean", "torso", -4, 4, 40, 250)
+_TURN = limit_in_degrees("body_turn", "torso", -25, 25, 60, 300)
+_LEAN = limit_in_degrees("body_lean", "torso", -4, 4, 40, 250)
 _ANTENNAS = (
-    _joint("right_antenna", "face", -180, 180, 450, 6000),
-    _joint("left_antenna", "face", -180, 180, 450, 6000),
+    limit_in_degrees("right_antenna", "face", -180, 180, 450, 6000),
+    limit_in_degrees("left_antenna", "face", -180, 180, 450, 6000),
 )
 TRACKS: Mapping[str, tuple[JointLimit, ...]] = {
     "head": (
-        _joint("head_yaw", "head", -150, 150, 170, 1700),
-        _joint("head_pitch", "head", -33, 30, 170, 1700),
-        _joint("body_follow", "head", -120, 120, 110, 800),
+        limit_in_degrees("head_yaw", "head", -150, 150, 170, 1700),
+        limit_in_degrees("head_pitch", "head", -33, 30, 170, 1700),
+        limit_in_degrees("body_follow", "head", -120, 120, 110, 800),
     ),
     "nod": (
-        _joint("nod_yaw", "head", -8, 8, 110, 1500),
-        _joint("nod_pitch", "head", -8, 8, 110, 1500),
-        _joint("nod_roll", "head", -12, 12, 110, 1500),
+        limit_in_degrees("nod_yaw", "head", -8, 8, 110, 1500),
+        limit_in_degrees("nod_pitch", "head", -8, 8, 110, 1500),
+        limit_in_degrees("nod_roll", "head", -12, 12, 110, 1500),
     ),
     "torso": (_TURN, _LEAN),
     "face": _ANTENNAS,
@@ -68,11 +62,11 @@ HOME: Mapping[str, tuple[float, ...]] = {
     "head": (0.0, 0.0, 0.0), "nod": (0.0, 0.0, 0.0), "torso": (0.0, 0.0), "face": (-UPRIGHT, UPRIGHT)
 }  # fmt: skip
 LIMITS = (
-    _joint("head_yaw", "head", -160, 160, 280, 3200),
-    _joint("head_pitch", "head", -41, 40, 280, 3200),
-    _joint("head_roll", "head", -12, 12, 110, 1500),
-    _joint("body_yaw", "torso", -145, 145, 170, 1100),
-    _joint("body_lean", "torso", -4.2, 4.2, 40, 250),
+    limit_in_degrees("head_yaw", "head", -160, 160, 280, 3200),
+    limit_in_degrees("head_pitch", "head", -41, 40, 280, 3200),
+    limit_in_degrees("head_roll", "head", -12, 12, 110, 1500),
+    limit_in_degrees("body_yaw", "torso", -145, 145, 170, 1100),
+    limit_in_degrees("body_lean", "torso", -4.2, 4.2, 40, 250),
     *_ANTENNAS,
 )
 """Joints as they are measured."""
@@ -170,15 +164,9 @@ def lean(x: Meters, y: Meters, body_yaw: Radians) -> Radians:
 
 def gaze(pose: Angles, mounting: Mounting) -> Ray:
     """Gaze in the robot's frame: from the camera along its axis."""
-    yaw, pitch, roll = pose["head_yaw"], pose["head_pitch"], pose["head_roll"]
-    ahead = (math.cos(pitch) * math.cos(yaw), math.cos(pitch) * math.sin(yaw), math.sin(pitch))
-    left = (-math.sin(yaw), math.cos(yaw), 0.0)
-    upright = (-math.sin(pitch) * math.cos(yaw), -math.sin(pitch) * math.sin(yaw), math.cos(pitch))
-    up = tuple(math.cos(roll) * a + math.sin(roll) * b for a, b in zip(upright, left, strict=True))
+    ahead, up = kinematics.axes(pose["head_yaw"], pose["head_pitch"], pose["head_roll"])
     x, y, z = head_place(pose)
-    eyes = tuple(
-        here + EYES_AHEAD * a + EYES_ABOVE * b for here, a, b in zip((x, y, z + HEAD_HEIGHT), ahead, up, strict=True)
-    )
+    eyes = [a + EYES_AHEAD * b + EYES_ABOVE * c for a, b, c in zip((x, y, z + HEAD_HEIGHT), ahead, up, strict=True)]
     return Ray(origin=mounting.from_foot((eyes[0], eyes[1], eyes[2])), axis=mounting.turned(ahead))
 
 
@@ -187,10 +175,5 @@ def aim(target: Vector, pose: Angles, mounting: Mounting) -> tuple[Radians, Radi
 
     target: metres in the robot's frame. pose: the turn and lean of the body count.
     """
-    x, y, z = mounting.to_foot(target)
-    dx, dy, dz = head_place(pose)
-    x, y, z = x - dx, y - dy, z - dz - HEAD_HEIGHT
-    across = math.hypot(x, y)
-    # The axis passes EYES_ABOVE the head's frame, so the pitch is a little less than the direction from there.
-    above = math.asin(EYES_ABOVE / max(math.hypot(across, z), EYES_ABOVE))
-    return math.atan2(y, x), math.atan2(z, across) - above
+    (x, y, z), (dx, dy, dz) = mounting.to_foot(target), head_place(pose)
+    return kinematics.turned_to(x - dx, y - dy, z - dz - HEAD_HEIGHT, EYES_ABOVE)

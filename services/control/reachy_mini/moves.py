@@ -17,7 +17,7 @@ from engage_hri.schemas.units import Radians, Seconds, Vector
 from engage_hri.schemas.world import World
 from engage_hri.services.control.bases import moving_parts
 from engage_hri.services.control.bases.moving_parts import Clock, MovingParts
-from engage_hri.services.control.bases.watch import Off, Watch, farthest
+from engage_hri.services.control.bases.watch import Off, Watch, farthest, nearest
 from engage_hri.services.control.contract.body import MovementAuthority
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure.choreography import is_shift
@@ -51,8 +51,6 @@ ASTRAY = radians(6.0)
 """Joints that are further than this from where they were sent have been moved by somebody else."""
 BEHIND: Seconds = 0.1
 """How far behind a sync point the joints may be measured to have passed it: measurements come now and then."""
-SAMPLES = 6
-"""Places of a path between a sync point and where the plan is, at which the joints may be to have come there."""
 FRAME: Seconds = 0.02
 """Seconds between two measurements; a point is told of by the first one that bears it out."""
 GAIN, SMOOTH, LONGEST = 0.08, 0.3, radians(0.35)
@@ -168,17 +166,9 @@ class Moves(MovingParts[Run]):
             self._error = np.zeros(2)
             return
         self._error = (1.0 - SMOOTH) * self._error + SMOOTH * error
-        most, is_off = (
-            radians(self._settings.correction),
-            np.abs(self._error) >= radians(self._settings.on_target) / 2,
-        )
-        before = self.trim
-        further = np.clip(before + np.clip(GAIN * self._error, -LONGEST, LONGEST), -most, most)
-        self.trim = np.where(is_off, further, before)
-
-    def busy(self, now: Seconds) -> set[str]:
-        """Names of the tracks that move, or that a behavior has."""
-        return {name for name, track in self.tracks.items() if name in self.runs or track.is_moving(now)}
+        most, enough = radians(self._settings.correction), radians(self._settings.on_target) / 2
+        further = np.clip(self.trim + np.clip(GAIN * self._error, -LONGEST, LONGEST), -most, most)
+        self.trim = np.where(np.abs(self._error) < enough, self.trim, further)
 
     # -- planning -----------------------------------------------------------------------------------------------
 
@@ -347,8 +337,8 @@ class Moves(MovingParts[Run]):
 
     def off(self, name: str, there: Sequence[float]) -> Off:
         """Tell how far the measured joints of a track are off some angles."""
-        names = self.tracks[name].joints
-        return farthest(names, self._of_track(name, self.clock.time()), there, [self._near[each] for each in names])
+        names, here = self.tracks[name].joints, self._of_track(name, self.clock.time())
+        return farthest(zip(names, here, there, [self._near[each] for each in names], strict=True))
 
     def off_run(self, run: Run, sync: str) -> Off:
         """Tell how far the measured joints are off a sync point, or off the nearest place on the way behind it.
@@ -360,8 +350,7 @@ class Moves(MovingParts[Run]):
         path = run.motion.path
         mark = path.marks[sync]
         s = min(run.motion.s(self.clock.time()), mark + BEHIND)  # later it may be where a stuck joint is
-        places = np.linspace(mark, s, SAMPLES).tolist() if s - mark > 1e-6 else [mark]
-        return min((self.off(run.track, path.at(place).q.tolist()) for place in places), key=lambda off: off.share)
+        return nearest(mark, s, lambda place: self.off(run.track, path.position(place).tolist()))
 
     def off_target(self, look: BlockBehavior | None) -> Off:
         """Tell how far the measured gaze axis is off the target of a look; None: off where the head will rest.

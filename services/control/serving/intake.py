@@ -64,7 +64,7 @@ from engage_hri.services.control.serving.actions import ActionMessage, ActionRep
 from engage_hri.services.control.serving.live_behavior import LiveBehavior, Status
 from engage_hri.services.control.serving.words_for_voice import progress_of
 from engage_hri.services.reports.ongoing_actions import OngoingActionTracker
-from engage_hri.services.requests.serving_effects import HoldRequest
+from engage_hri.services.requests.serving import HoldRequest
 from engage_hri.services.runtime.intake import AnswerRequest, Input, PublishMessage
 
 REVOKED_WITHIN: Seconds = 4.0

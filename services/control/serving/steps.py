@@ -15,7 +15,7 @@ from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.contract.body import Progress, Revocation
-from engage_hri.services.requests.serving_effects import HoldRequest
+from engage_hri.services.requests.serving import HoldRequest
 
 
 class Nonsense(Struct, frozen=True, tag="nonsense"):

@@ -9,11 +9,9 @@ from contextlib import aclosing
 from math import inf, radians
 from typing import Self
 
-from msgspec import Struct
-
 from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, NoPointZone, Ray
-from engage_hri.schemas.body_faults import KINDS, BodyFault, flaw
+from engage_hri.schemas.body_faults import KINDS, BodyFault, refuse
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Radians, Seconds
@@ -36,16 +34,14 @@ from engage_hri.services.control.contract.variability import Deviations
 from engage_hri.services.control.figure import choreography, kinematics, tracks
 from engage_hri.services.control.figure.alive import Alive
 from engage_hri.services.control.figure.estimates import beneath_a_look, wait_estimate
-from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
-from engage_hri.services.control.figure.repertoire_files import repertoire_of
-from engage_hri.services.control.figure.tracks import PartTrack
+from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire, repertoire_of
 from engage_hri.services.control.motion.points import WalkPoint
 from engage_hri.services.control.torso.mouth import Mouth
 from engage_hri.services.control.torso.rehearsal import ClockOfCopy, beside, rehearsed
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
 from engage_hri.services.control.torso.torso import Torso
-from engage_hri.services.control.voice.estimate import speech_estimate
 from engage_hri.services.control.voice.lipsync import LipSync
+from engage_hri.services.control.voice.speaker import speech_estimate
 from engage_hri.services.control.voice.timeline import uttered
 from engage_hri.services.control.voice.voice import Voice
 from engage_hri.services.runtime.steps import Steps, finished
@@ -54,16 +50,6 @@ FAULTS = tuple(KINDS)
 """Kinds of faults that it can play: all that have a name."""
 ELEMENTS = 256
 """Elements that an estimate with a path counts for (see `steps`)."""
-
-
-class Measured(Struct, frozen=True):
-    """A pose with its rays. angles: of each track."""
-
-    angles: Mapping[str, tuple[float, ...]]
-    pose: BodyPose
-    gaze: Ray
-    left_arm: Ray
-    right_arm: Ray
 
 
 class SimulatedBody(WalkingBody[Run]):
@@ -87,9 +73,7 @@ class SimulatedBody(WalkingBody[Run]):
             joints=kinematics.JOINTS, reach=kinematics.REACH, no_point_zones=zones, faults=FAULTS,
         )  # fmt: skip
         self._deviations = variability.configured(deviations or Variability())
-        for fault in self._deviations.faults:
-            if reason := flaw(fault, self.capabilities):
-                raise InputRefused(Fault(reason=reason, where="control.variability", service="control"))
+        refuse(self._deviations.faults, self.capabilities, "control.variability")
         self.moves = Torso(self._loop, zones, repertoire, _displaced(self._deviations.faults))
         self._voice = Voice(is_mute=bool(self._deviations.of("mute")))
         self._occasions = 0
@@ -98,7 +82,6 @@ class SimulatedBody(WalkingBody[Run]):
         self.on_lips = self.move_lips
         self._offsets: dict[str, float] = {}
         """Radians by which the true angle of a joint is more than what it measures, as its calibration says."""
-        self._told: Measured | None = None
 
     @classmethod
     def configured(cls, config: ControlConfig, settings: None) -> Self:
@@ -166,9 +149,10 @@ class SimulatedBody(WalkingBody[Run]):
 
     def state(self) -> BodyState:
         now = self._loop.time()
-        self._told = told = _measured(self.moves.tracks, now, self._told)
+        pose = tracks.pose_at(self.moves.tracks, now)
         return BodyState(
-            pose=told.pose, gaze=told.gaze, left_arm=told.left_arm, right_arm=told.right_arm,
+            pose=kinematics.pose_message(pose), gaze=kinematics.gaze(pose),
+            left_arm=kinematics.arm(pose, "left"), right_arm=kinematics.arm(pose, "right"),
             moving=self._voice.is_busy or any(track.is_moving(now) for track in self.moves.tracks.values()),
             looking_at=self.moves.attention.fixated(now), speaking=self._voice.saying,
         )  # fmt: skip
@@ -291,29 +275,6 @@ def _displaced(faults: Sequence[BodyFault]) -> dict[str, float]:
 
 def _fault(behavior: BlockBehavior, reason: str, advice: str = "") -> Fault:
     return Fault(reason=reason, where=behavior.id, advice=advice, service="control")
-
-
-def _measured(parts: Mapping[str, PartTrack], t: Seconds, before: Measured | None = None) -> Measured:
-    """Measure at loop time t.
-
-    before: what was measured last. Often nothing has moved since, and hardly ever everything: what has not is taken
-    from there.
-    """
-    angles = {part: track.angles(t) for part, track in parts.items()}
-    if before is None:
-        moved = set(angles)
-    elif angles == before.angles:
-        return before
-    else:
-        moved = {part for part, at in angles.items() if at != before.angles[part]}
-    pose = tracks.pose_of(parts, angles.values())
-    return Measured(
-        angles,
-        kinematics.pose_message(pose),
-        kinematics.gaze(pose) if before is None or moved & {"torso", "head", "nod"} else before.gaze,
-        kinematics.arm(pose, "left") if before is None or moved & {"torso", "left_arm"} else before.left_arm,
-        kinematics.arm(pose, "right") if before is None or moved & {"torso", "right_arm"} else before.right_arm,
-    )
 
 
 def _beside(deviations: Deviations, offsets: Mapping[str, Radians]) -> dict[str, Radians]:

@@ -102,7 +102,7 @@ def retargeted(run: Run, course: Course, track: PartTrack, now: Seconds) -> Path
     start = track.start_at(now, course.aim)
     seconds = turning_time(start.q.tolist(), course.legs[0].goal) if run.holding else _left(run, now)
     legs = (replace(course.legs[0], seconds=max(seconds, SHORTEST)), *course.legs[1:])
-    return Path(start, run.with_faults(legs), track.limits(now, course.aim))
+    return Path(start, legs, track.limits(now, course.aim))
 
 
 def homeward(run: Run, base: tuple[float, ...], track: PartTrack, now: Seconds, aim: Aim | None) -> Path | None:
@@ -110,7 +110,7 @@ def homeward(run: Run, base: tuple[float, ...], track: PartTrack, now: Seconds, 
     if not differ(base, track.going(None if aim is None else aim.trunk)):
         return None
     leg = replace(run.course.legs[-1], goal=base, seconds=_left(run, now))
-    return Path(track.start_at(now, aim), run.with_faults((leg,)), track.limits(now, aim))
+    return Path(track.start_at(now, aim), (leg,), track.limits(now, aim))
 
 
 def going_to(old: Course, new: Course) -> tuple[float, ...]:

@@ -16,7 +16,7 @@ from engage_hri.services.control.figure import choreography
 from engage_hri.services.control.figure.course import Course, Situation
 from engage_hri.services.control.figure.sizing import hurried
 from engage_hri.services.control.motion.motion import Motion
-from engage_hri.services.control.motion.path import Leg, Path, unmarked
+from engage_hri.services.control.motion.path import Path
 from engage_hri.services.control.motion.points import WalkPoint
 from engage_hri.services.runtime.steps import Steps
 
@@ -84,8 +84,7 @@ class Run(moving_parts.Run):
         if reduced is None:
             return None
         self.size = reduced.size
-        self._mark_faults(motion := Motion(reduced.path, now), now)
-        return motion.path
+        return reduced.path
 
     def keep_pace(self, now: Seconds) -> bool:
         """Set the rate such that it reaches its next point at the instant asked for. True if that is a new aim."""
@@ -142,14 +141,10 @@ class Run(moving_parts.Run):
     def limit(self, path: Path) -> Seconds:
         return min(self.gate, super().limit(path))
 
-    def with_faults(self, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:
-        """Mark the faults that are still due on new `legs`."""
-        marked = {sync for leg in legs for sync, _ in leg.marks}
-        for number, point in enumerate(self.pending):
-            if point.sync in FAULTS and point.sync not in marked:
-                following = next(each.sync for each in self.pending[number:] if each.sync not in FAULTS)
-                legs = tuple(_marked(leg, point.sync, following) for leg in legs)
-        return legs
+    def with_faults(self, path: Path, now: Seconds) -> Path:
+        """Mark the faults that are still due on a new path."""
+        self._mark_faults(motion := Motion(path, now), now)
+        return motion.path
 
     def deviate(self, deviations: Deviations, now: Seconds) -> None:
         """Take over exactly these faults, in the middle of the motion."""
@@ -175,19 +170,12 @@ class Run(moving_parts.Run):
         }
         for mark in (mark for mark, fault in due.items() if fault != self.faults.get(mark)):
             self.pending = [point for point in self.pending if point.sync != mark]
-            self.course = replace(self.course, legs=unmarked(self.course.legs, mark))
             if (fault := due[mark]) is not None:
-                self._insert_fault(mark, fault.before or ("stroke" if self.awaits("stroke") else "end"))
+                before = fault.before or ("stroke" if self.awaits("stroke") else "end")
+                syncs = [point.sync for point in self.pending]
+                if before in syncs:
+                    self.pending.insert(syncs.index(before), WalkPoint(mark, is_told=False))
         self.faults = dict(due)
-
-    def _insert_fault(self, fault: str, before: str) -> None:
-        """Put `fault` half-way to sync point `before`, on the leg that has it."""
-        index = next((i for i, point in enumerate(self.pending) if point.sync == before), None)
-        if index is None:
-            return
-        legs = tuple(_marked(leg, fault, before) for leg in self.course.legs)
-        self.course = replace(self.course, legs=legs)
-        self.pending.insert(index, WalkPoint(fault, is_told=False))
 
     def _mark_faults(self, motion: Motion, now: Seconds) -> None:
         """Mark the faults that are due on the path of a motion, half-way from here. One that comes too late to stop
@@ -207,11 +195,3 @@ class Run(moving_parts.Run):
                 self.pending = [each for each in self.pending if each is not point]
             else:
                 motion.path = path.marked(point.sync, half)
-
-
-def _marked(leg: Leg, fault: str, before: str) -> Leg:
-    fractions = dict(leg.marks)
-    if before not in fractions:
-        return leg
-    earlier = max((fraction for fraction in fractions.values() if fraction < fractions[before]), default=0.0)
-    return replace(leg, marks=(*leg.marks, (fault, (earlier + fractions[before]) / 2)))

@@ -23,8 +23,7 @@ from engage_hri.services.control.figure.aiming import TRUNK, UPRIGHT, Aim
 from engage_hri.services.control.figure.course import Course, Situation
 from engage_hri.services.control.figure.estimates import is_arm
 from engage_hri.services.control.figure.pace import arm_time
-from engage_hri.services.control.figure.table_lift import LIFTS, are_clear, lifted
-from engage_hri.services.control.figure.tracks import PartTrack
+from engage_hri.services.control.figure.tracks import LIFTS, PartTrack, are_clear, lifted
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import Leg, Path
 from engage_hri.services.control.motion.track import SAME, Trunk
@@ -192,7 +191,7 @@ class ClearOfTable(MovingParts[Run]):
                 raised = Leg(goal=lifted(joints, here, lift), seconds=LIFTING, marks=waiting)
                 legs = (raised, replace(legs[0], marks=rest), *legs[1:])
             yield OF_A_WAY
-            path = Path(start, run.with_faults(legs), tracks.limits_of(run.course.parts))
+            path = Path(start, legs, tracks.limits_of(run.course.parts))
             since = legs[0].seconds if len(legs) > 1 else path.length
             if tracks.meets_table(path, joints, around, since=since):
                 if not _are_clear(path.legs[-1].goal, joints, around):
@@ -241,7 +240,7 @@ class ClearOfTable(MovingParts[Run]):
             legs = [replace(leg, goal=to.goal, velocity=to.velocity) for leg, to in zip(left, new, strict=True)]
             least = arm_time(here, legs[0].goal, 0.0, 150.0) - 0.15
             legs[0] = replace(legs[0], seconds=max(legs[0].seconds, least))
-        return Path(start, run.with_faults(tuple(legs)), self.limits(run, course.aim, now))
+        return Path(start, tuple(legs), self.limits(run, course.aim, now))
 
 
 def _is_setting_out(run: Run, at: Seconds) -> bool:

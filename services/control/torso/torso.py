@@ -21,7 +21,6 @@ from engage_hri.services.control.figure import choreography, kinematics, tracks
 from engage_hri.services.control.figure.aiming import NECK, TRUNK, Aim
 from engage_hri.services.control.figure.course import Course, Situation
 from engage_hri.services.control.figure.estimates import Added, going_home, motion_estimate
-from engage_hri.services.control.figure.laid_paths import laid_path
 from engage_hri.services.control.figure.pace import return_time
 from engage_hri.services.control.figure.repertoire import Repertoire
 from engage_hri.services.control.figure.tracks import PartTrack
@@ -149,9 +148,21 @@ class Torso(ClearOfTable):
         start = self.start(course, situation)
         if situation is None and self.is_carried(course):
             return self._path_on_the_move(start, course)
-        path = laid_path(start, course)
+        path = self._path(start, course)
         if "torso" in course.parts:
             yield from self.check(course, path, None if situation is None else situation.pose)
+        return path
+
+    def _path(self, start: JointMotion, course: Course, *, is_free: bool = False) -> Path:
+        """Lay a path along a course that is clear of the table. Raises Impossible.
+
+        is_free: for a trunk that moves, without the ranges of joints (`tracks.limits_of`); who asks minds the table.
+        """
+        path = Path(start, course.legs, tracks.limits_of(course.parts, is_free=is_free))
+        # What is on a place is planned such that it is clear there wherever the trunk is; its way home is laid anew.
+        trunks = course.trunks if course.aim is None else course.trunks[:1]
+        if not is_free and tracks.meets_table(path, course.joints, trunks):
+            raise Impossible("CANNOT_CREATE_BEHAVIOR", "the table is in the way of the arm")
         return path
 
     def start(self, course: Course, situation: Situation | None = None) -> JointMotion:
@@ -167,10 +178,10 @@ class Torso(ClearOfTable):
 
     def _path_on_the_move(self, start: JointMotion, course: Course) -> Path:
         """Lay a path to a target while the trunk moves: it arrives when the target is in reach. Raises Impossible."""
-        path = laid_path(start, course, is_free=True)
+        path = self._path(start, course, is_free=True)
         point = course.arrival
         if delay := self._delay(course.aim, self.clock.time() + path.marks[point]):
-            path = laid_path(start, replace(course, legs=_delayed(course.legs, point, delay)), is_free=True)
+            path = self._path(start, replace(course, legs=_delayed(course.legs, point, delay)), is_free=True)
         self.check_carried(course, path)
         return path
 
@@ -202,6 +213,7 @@ class Torso(ClearOfTable):
 
     def play(self, run: Run, path: Path, aim: Aim | None) -> None:
         now, run.gate = self.clock.time(), inf
+        path = run.with_faults(path, now)
         run.play(Motion(path, now, cruise=run.cruise, limit=run.limit(path)))
         column = 0
         for part in run.course.parts:
@@ -248,14 +260,14 @@ class Torso(ClearOfTable):
     ) -> Path:
         """Path from a target to where the part belongs, from then on; of an arm a way that is clear of the table."""
         leg = _leg_home(run, start, goal)
-        path = Path(start, run.with_faults((leg,)), limits)
+        path = Path(start, (leg,), limits)
         if run.course.parts != ("head",):
             trunks = self.places(at)
             for above in tracks.raised(tuple(start.q.tolist()), run.course.joints):
                 if not tracks.meets_table(path, run.course.joints, trunks):
                     break
                 first = Leg(goal=above, seconds=tracks.RAISING, marks=leg.marks[:1])
-                legs = run.with_faults((first, replace(leg, marks=leg.marks[1:])))
+                legs = (first, replace(leg, marks=leg.marks[1:]))
                 path = Path(start, legs, limits)
         return path
 
@@ -277,7 +289,7 @@ class Torso(ClearOfTable):
             legs = run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
             limits = self.limits(run, aim, now)
             path = self._path_home(run, start, goal, limits, now) if is_homeward else None
-            self.play(run, path or Path(start, run.with_faults(legs), limits), aim)
+            self.play(run, path or Path(start, legs, limits), aim)
         return passed
 
     def extend(self, run: Run) -> None:
@@ -440,7 +452,7 @@ class Torso(ClearOfTable):
                 track = self.tracks[run.course.parts[0]]
                 left = run.motion.path.after(run.motion.s(now), [each.sync for each in run.pending])
                 start, legs = track.start_at(now, run.course.aim), _delayed(left, point, late)
-                path = Path(start, run.with_faults(legs), self.limits(run, run.course.aim, now))
+                path = Path(start, legs, self.limits(run, run.course.aim, now))
                 self.play(run, path, run.course.aim)
                 run.bell.ring()
 

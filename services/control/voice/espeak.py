@@ -18,8 +18,6 @@ from msgspec.structs import replace
 from engage_hri.schemas.documents.prosody import Prosody
 from engage_hri.schemas.suggestion import suggestion
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.voice.espeak_voices import variants, voices
-from engage_hri.services.control.voice.scripts import told, unread
 from engage_hri.services.control.voice.settings import VoiceSettings
 from engage_hri.services.control.voice.synthesis import (
     Heard,
@@ -31,6 +29,55 @@ from engage_hri.services.control.voice.synthesis import (
     refused,
 )
 from engage_hri.services.runtime.installation import extra_command
+
+
+class _Voice(ctypes.Structure):
+    """The type `espeak_VOICE` of espeak-ng/speak_lib.h."""
+
+    _fields_ = (
+        ("name", ctypes.c_char_p), ("languages", ctypes.c_void_p), ("identifier", ctypes.c_char_p),
+        ("gender", ctypes.c_ubyte), ("age", ctypes.c_ubyte), ("variant", ctypes.c_ubyte), ("unused", ctypes.c_ubyte),
+        ("score", ctypes.c_int), ("own", ctypes.c_void_p),
+    )  # fmt: skip
+
+
+def voices(library: Any) -> dict[str, str]:
+    """Identifiers of voices, as `gmw/en`, by the tags of their languages and by name, in lower case.
+
+    library: initialized.
+    """
+    found: dict[str, str] = {}
+    for voice in _voices(library, None):
+        for name in (*_languages(voice), voice.name.decode("utf-8", "replace")):
+            found.setdefault(name.lower(), voice.identifier.decode("utf-8", "replace"))
+    return found
+
+
+def variants(library: Any) -> set[str]:
+    """Names of the variants that it has, as `f2`. library: initialized."""
+    kind = ctypes.create_string_buffer(b"variant")
+    asked = _Voice(languages=ctypes.cast(kind, ctypes.c_void_p).value)
+    found = _voices(library, ctypes.byref(asked))
+    return {voice.identifier.decode("utf-8", "replace").removeprefix("!v/") for voice in found}
+
+
+def _voices(library: Any, asked: Any) -> Iterator[_Voice]:
+    library.espeak_ListVoices.restype = ctypes.POINTER(ctypes.POINTER(_Voice))
+    listed = library.espeak_ListVoices(asked)
+    number = 0
+    while listed[number]:
+        yield listed[number].contents
+        number += 1
+
+
+def _languages(voice: _Voice) -> Iterator[str]:
+    """A list in one string: before each name a byte with its rank, after the last name a byte of 0."""
+    place = voice.languages
+    while place and ctypes.string_at(place, 1) != b"\0":
+        name = ctypes.string_at(place + 1)
+        yield name.decode("utf-8", "replace")
+        place += len(name) + 2
+
 
 OR_ELSE = " (eSpeak NG is under the GPL, version 3), or Debian: apt install libespeak-ng1"
 
@@ -132,11 +179,6 @@ class EspeakSynthesizer(Synthesizer):
         ]
         return Said(bytes(self._sound), words, [Phone(name, self._seconds(at)) for name, at in self._phones])
 
-    @classmethod
-    def warnings(cls, phrase: Phrase) -> tuple[str, ...]:
-        found = unread(phrase.text, phrase.language or EspeakSettings().language, phrase.prosody)
-        return tuple(map(told, found))
-
     def _seconds(self, sample: int) -> Seconds:
         return sample / self.rate
 
@@ -213,9 +255,6 @@ def _loaded(settings: EspeakSettings) -> tuple[Any, bytes | None]:
         raise refused(f"no library of eSpeak NG: {error}", extra_command("voice") + OR_ELSE) from error
 
 
-_EMPHASIS = {"strong": "strong", "moderate": "moderate", "reduced": "reduced"}
-
-
 def ssml(phrase: Phrase) -> tuple[str, Sequence[int]]:
     """Write a phrase with its prosody as the SSML that eSpeak NG reads.
 
@@ -253,7 +292,7 @@ def _tags(span: Prosody) -> Iterator[tuple[str, str]]:
     if asked:
         yield f"<prosody{asked}>", "</prosody>"
     if span.emphasis:
-        yield f'<emphasis level="{_EMPHASIS[span.emphasis]}">', "</emphasis>"
+        yield f'<emphasis level="{span.emphasis}">', "</emphasis>"
 
 
 def _percent(name: str, factor: float) -> str:

@@ -1,7 +1,7 @@
 """Outlets for sound: what a voice plays goes to a device, into a file, or nowhere, at loop times."""
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from contextlib import ExitStack
 
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
@@ -10,24 +10,33 @@ STUCK: Seconds = 0.8
 """So long an outlet may take nothing while it is late, before it counts as dead."""
 
 
-class Outlet(Protocol):
-    """A way for sound. All times are loop times, seconds.
+class Outlet:
+    """A way for sound; this one leads nowhere, and takes what it is given at once. All times are loop times, seconds.
 
-    lead: how long before a sound is to be heard it has to be played. fault: why nothing is heard any more.
-    is_live: true if it may be late: then `late` is to be asked before anything is told as heard.
+    now: loop time. lead: how long before a sound is to be heard it has to be played. fault: why nothing is heard any
+    more. is_live: true if it may be late: then `late` is to be asked before anything is told as heard.
     """
 
-    @property
-    def is_live(self) -> bool: ...
+    def __init__(self, now: Callable[[], Seconds]) -> None:
+        self.now = now
+        self._fault: Fault | None = None
+        self._on_fault: list[Callable[[], None]] = []
 
     @property
-    def lead(self) -> Seconds: ...
+    def is_live(self) -> bool:
+        return False
 
     @property
-    def fault(self) -> Fault | None: ...
+    def lead(self) -> Seconds:
+        return 0.0
+
+    @property
+    def fault(self) -> Fault | None:
+        return self._fault
 
     def earliest(self) -> Seconds:
         """The earliest time at which sound that is played now is heard."""
+        return self.now()
 
     def play(self, samples: bytes, at: Seconds) -> None:
         """Play samples so that they sound from `at` on: 16 bit, little-endian, one channel.
@@ -45,6 +54,7 @@ class Outlet(Protocol):
 
         Returns None if nothing is late; 0 if it is as late as when last asked, and nothing was taken since.
         """
+        return None
 
     def cut(self, at: Seconds, tail: bytes) -> None:
         """Take back what was played and would be heard from `at` on. It is called at that time.
@@ -52,40 +62,21 @@ class Outlet(Protocol):
         tail: the last samples before it as they should have been, for an outlet that can still change them.
         """
 
+    def revive(self) -> None:
+        """Try again after a fault."""
+
     def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
         """Call `on_fault` when there is one, until the returned function is called."""
+        self._on_fault.append(on_fault)
+        return lambda: self._on_fault.remove(on_fault)
+
+    def tell_fault(self) -> None:
+        """Call all that watch."""
+        for each in list(self._on_fault):
+            each()
 
 
-class Nowhere:
-    """An outlet that nobody hears. Times are as with sound."""
-
-    lead: Seconds = 0.0
-    fault: Fault | None = None
-    is_live = False
-
-    def __init__(self, now: Callable[[], Seconds]) -> None:
-        self._now = now
-
-    def earliest(self) -> Seconds:
-        return self._now()
-
-    def play(self, samples: bytes, at: Seconds) -> None:
-        """Let the sound go."""
-
-    def rest(self) -> None:
-        """Need nothing."""
-
-    def late(self) -> Seconds | None:
-        return None
-
-    def cut(self, at: Seconds, tail: bytes) -> None:
-        """Need nothing."""
-
-    def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
-        return lambda: None
-
-
-class Several:
+class Several(Outlet):
     """Several outlets as one: sound is heard at the same time in each.
 
     The first is what people hear: all goes by its time, and its fault is that of all. Another one that fails is
@@ -94,6 +85,7 @@ class Several:
 
     def __init__(self, outlets: Sequence[Outlet]) -> None:
         """Join outlets, at least one."""
+        super().__init__(outlets[0].now)
         self._outlets = outlets
 
     @property
@@ -126,29 +118,28 @@ class Several:
         for each in self._outlets:
             each.cut(at, tail)
 
+    def revive(self) -> None:
+        for each in self._outlets:
+            each.revive()
+
     def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
-        ends = [each.watch(on_fault) for each in self._outlets]
-
-        def unwatch() -> None:
-            for end in ends:
-                end()
-
-        return unwatch
+        ends = ExitStack()
+        for each in self._outlets:
+            ends.callback(each.watch(on_fault))
+        return ends.close
 
 
-class Gag:
+class Gag(Outlet):
     """An outlet that can be made to take no sound, as a device that has stopped: the fault `mute`."""
 
     def __init__(self, outlet: Outlet, now: Callable[[], Seconds]) -> None:
         """Let sound through to an outlet. now: loop time."""
+        super().__init__(now)
         self.outlet = outlet
-        self._now = now
         self._is_mute = False
-        self._fault: Fault | None = None
         self._since: Seconds | None = None
         """Loop time at which it was first asked whether sound is late."""
         self._asked: Seconds = 0.0
-        self._watchers: list[Callable[[], None]] = []
 
     @property
     def is_live(self) -> bool:
@@ -165,15 +156,14 @@ class Gag:
     def switch(self, *, is_mute: bool) -> None:
         """Take no more sound, or take it again. What was played is not heard to its end."""
         if is_mute and not self._is_mute:
-            self.outlet.cut(self._now(), b"")
+            self.outlet.cut(self.now(), b"")
         self._is_mute = is_mute
         self.revive()
-        for each in list(self._watchers):
-            each()
+        self.tell_fault()
 
     def revive(self) -> None:
-        """Try again after a fault."""
         self._fault = self._since = None
+        self.outlet.revive()
 
     def earliest(self) -> Seconds:
         return self.outlet.earliest()
@@ -189,7 +179,7 @@ class Gag:
     def late(self) -> Seconds | None:
         if not self._is_mute:
             return self.outlet.late()
-        now = self._now()
+        now = self.now()
         if self._since is None:
             self._since = self._asked = now
         late, self._asked = now - self._asked, now
@@ -202,11 +192,7 @@ class Gag:
             self.outlet.cut(at, tail)
 
     def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
-        unwatch = self.outlet.watch(on_fault)
-        self._watchers.append(on_fault)
-
-        def end() -> None:
-            unwatch()
-            self._watchers.remove(on_fault)
-
-        return end
+        ends = ExitStack()
+        ends.callback(super().watch(on_fault))
+        ends.callback(self.outlet.watch(on_fault))
+        return ends.close

@@ -6,18 +6,140 @@ it.
 """
 
 import asyncio
+import os
 import shutil
+import signal
+import struct
 import subprocess
 from collections.abc import AsyncIterator, Callable, Sequence
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from math import inf
 from typing import NamedTuple
 
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.voice.outlets import STUCK
-from engage_hri.services.control.voice.pipe import FedProcess
+from engage_hri.schemas.utf8 import printable
+from engage_hri.services.control.voice.outlets import STUCK, Outlet
 from engage_hri.services.control.voice.settings import VoiceSettings
+
+try:
+    import fcntl
+    import termios
+except ImportError:  # on Windows the pipe keeps its size, and does not say what is in it
+    fcntl = termios = None  # type: ignore[assignment]
+
+
+WORDS = 1000
+"""Bytes that are kept of the beginning and of the end of what it says."""
+
+
+class FedProcess:
+    """A process with a pipe to its standard input.
+
+    What it has not taken is known: what is still here, and what is in the pipe. What it has taken and keeps is not.
+    """
+
+    def __init__(self, command: Sequence[str], pipe: int, on_end: Callable[[], None]) -> None:
+        """Start it. pipe: bytes that the pipe is to hold. on_end: called when it closes its input, or ends.
+
+        Raises:
+            OSError: it does not start.
+        """
+        self._loop, self._on_end = asyncio.get_running_loop(), on_end
+        self._unsent = bytearray()
+        self._is_open = True
+        # Not asyncio's own: it starts a thread for each child in Python 3.11. A group: to end its children, too.
+        self.process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, process_group=0
+        )
+        assert self.process.stdin is not None
+        assert self.process.stderr is not None
+        self._said = b""
+        """The first and the last that it has said on standard error, where players tell of every pause."""
+        self._errors = self.process.stderr.fileno()
+        os.set_blocking(self._errors, False)
+        self._loop.add_reader(self._errors, self._hear)
+        self._pipe = self.process.stdin.fileno()
+        os.set_blocking(self._pipe, False)
+        if fcntl is not None and hasattr(fcntl, "F_SETPIPE_SZ"):
+            with suppress(OSError):
+                fcntl.fcntl(self._pipe, fcntl.F_SETPIPE_SZ, pipe)
+        self._loop.add_reader(self._pipe, self._closed)  # the end of a pipe that is written to wakes as it is closed
+
+    @property
+    def untaken(self) -> int:
+        """Bytes that were written and that the process has not read."""
+        if not self._is_open or termios is None:
+            return len(self._unsent)
+        count = bytearray(4)
+        with suppress(OSError):
+            fcntl.ioctl(self._pipe, termios.FIONREAD, count)
+        return len(self._unsent) + int(struct.unpack("i", count)[0])
+
+    @property
+    def words(self) -> str:
+        """Return what it has said last on standard error: before that come complaints of its libraries."""
+        lines = [line.strip() for line in self._said.decode(errors="replace").splitlines() if line.strip()]
+        return printable(lines[-1])[:200] if lines else ""
+
+    def write(self, content: bytes) -> None:
+        """Let it have some bytes, after those before; once it is gone they are lost."""
+        if self._is_open:
+            was_empty = not self._unsent
+            self._unsent += content
+            if was_empty:
+                self._send()
+
+    def kill(self) -> None:
+        """End it, and all that it has started, with all that it has taken. It is dead when `is_dead`."""
+        self._close()
+        with suppress(OSError):
+            os.killpg(self.process.pid, signal.SIGKILL)
+
+    @property
+    def is_dead(self) -> bool:
+        return self.process.poll() is not None
+
+    def _send(self) -> None:
+        try:
+            del self._unsent[: os.write(self._pipe, self._unsent)]
+        except BlockingIOError:
+            pass
+        except OSError:  # `_closed` is called for that, too
+            self._unsent.clear()
+        if self._unsent:
+            self._loop.add_writer(self._pipe, self._send)
+        else:
+            self._loop.remove_writer(self._pipe)
+
+    def _hear(self) -> None:
+        try:
+            more = os.read(self._errors, 4096)
+        except BlockingIOError:
+            return
+        if not more:
+            self._loop.remove_reader(self._errors)
+        self._said += more
+        if len(self._said) > 2 * WORDS:
+            self._said = self._said[:WORDS] + b"\n" + self._said[-WORDS:]
+
+    def _closed(self) -> None:
+        self._hear()
+        self._close()
+        self._on_end()
+
+    def _close(self) -> None:
+        if self._is_open:
+            self._is_open = False
+            self._loop.remove_reader(self._pipe)
+            self._loop.remove_writer(self._pipe)
+            assert self.process.stdin is not None
+            with suppress(OSError):
+                self.process.stdin.close()
+            self._loop.remove_reader(self._errors)
+            assert self.process.stderr is not None
+            self.process.stderr.close()
+
 
 MARGIN: Seconds = 0.08
 """How much earlier than needed sound is handed over: for the buffer of the player, and a loop that is late."""
@@ -71,19 +193,16 @@ PLAYERS: dict[str, PlayerProgram] = {
 """Player programs by name, in the order in which they are tried."""
 
 
-class Player:
+class Player(Outlet):
     """An outlet to a sound device. After a fault, or a cut, the next `ready` starts the player anew."""
-
-    is_live = True
 
     def __init__(self, program: PlayerProgram, rate: int) -> None:
         """Start nothing yet. rate: samples per second."""
+        self._loop = asyncio.get_running_loop()
+        super().__init__(self._loop.time)
         self._command = tuple(word.replace("{rate}", str(rate)) for word in program.command)
         self._rate, self._latency = rate, program.latency
-        self._loop = asyncio.get_running_loop()
-        self.lead: Seconds = program.latency + MARGIN
-        self.fault: Fault | None = Fault(reason="the player was not started", service="control")
-        self._on_fault: list[Callable[[], None]] = []
+        self._fault = Fault(reason="the player was not started", service="control")
         self._process: FedProcess | None = None
         self._dying: FedProcess | None = None
         """The player before this one: until it is dead the device may be taken."""
@@ -97,6 +216,14 @@ class Player:
         self._stands: tuple[Seconds, int] | None = None
         """Since when, in loop time, the player has taken no more than so many bytes, though it is late."""
 
+    @property
+    def is_live(self) -> bool:
+        return True
+
+    @property
+    def lead(self) -> Seconds:
+        return self._latency + MARGIN
+
     @asynccontextmanager
     async def connected(self) -> AsyncIterator[None]:
         """Run the player. Raises RunFailed: it does not run, or ends at once."""
@@ -104,8 +231,7 @@ class Player:
             await self.ready()
             await self._live()
             if self.fault is not None:
-                fault = self.fault
-                raise RunFailed(fault)
+                raise RunFailed(self.fault)
             yield
         finally:
             await self._end()
@@ -114,7 +240,7 @@ class Player:
         """Start the player if it is not running, when the one before it is dead."""
         if self.fault is not None:
             self._drop()
-            self.fault = None
+            self._fault = None
         for _ in range(DYING):
             if self._try_to_start():
                 return
@@ -122,14 +248,14 @@ class Player:
         self._fail(f"the player {self._command[0]} does not die", "does its sound device hang?")
 
     def earliest(self) -> Seconds:
-        now = self._loop.time()
+        now = self.now()
         self._heard_until = max(self._heard_until, now + self._untaken)
         return max(self._heard_until, now + self.lead)
 
     def play(self, samples: bytes, at: Seconds) -> None:
         if self.fault is not None or self._process is None:
             return
-        now = self._loop.time()
+        now = self.now()
         since = max(self._heard_until, now + self._untaken, now + self._latency)
         silence = max(0, round((at - since) * self._rate))
         self._write(bytes(2 * silence) + samples)
@@ -138,12 +264,12 @@ class Player:
     def rest(self) -> None:
         if self.fault is None and self._process is not None:
             self._write(bytes(2 * round(FLUSH * self._rate)))
-            self._heard_until = max(self._heard_until, self._loop.time() + self._latency) + FLUSH
+            self._heard_until = max(self._heard_until, self.now() + self._latency) + FLUSH
 
     def late(self) -> Seconds | None:
         if self.fault is not None or self._process is None:
             return None
-        now, untaken = self._loop.time(), self._untaken
+        now, untaken = self.now(), self._untaken
         taken = self._written - self._process.untaken
         stands = self._stands is not None and taken == self._stands[1]
         late = untaken - (self._heard_until - now) if untaken else 0.0
@@ -166,10 +292,6 @@ class Player:
         if self.fault is None:
             self._drop()
             self._start_again()
-
-    def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
-        self._on_fault.append(on_fault)
-        return lambda: self._on_fault.remove(on_fault)
 
     # -- the program --------------------------------------------------------------------------------------------
 
@@ -201,7 +323,7 @@ class Player:
         if self._dying is not None and not self._dying.is_dead:
             return False
         self._dying = self._stands = None
-        self._heard_until, self._written, self._started = 0.0, 0, self._loop.time()
+        self._heard_until, self._written, self._started = 0.0, 0, self.now()
         try:
             self._process = FedProcess(self._command, PIPE, self._lost)
         except OSError as error:
@@ -216,16 +338,15 @@ class Player:
         self._fail(f"the player {self._command[0]} {how}{words}", f"is there a sound card? {WITHOUT}")
 
     def _fail(self, reason: str, advice: str) -> None:
-        self.fault = Fault(reason=reason, where="sound device", advice=advice, service="control")
+        self._fault = Fault(reason=reason, where="sound device", advice=advice, service="control")
         self._drop()
-        for each in list(self._on_fault):
-            each()
+        self.tell_fault()
 
     async def _live(self) -> None:
         """Wait until the player has taken a little silence, and has lived for a while, or until there is a fault."""
-        begin = self._loop.time()
+        begin = self.now()
         self.rest()
-        while self.fault is None and (now := self._loop.time()) < begin + STARTING:
+        while self.fault is None and (now := self.now()) < begin + STARTING:
             if now >= begin + PROBE and not self._untaken:
                 return
             await asyncio.sleep(_STEP)

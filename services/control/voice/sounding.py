@@ -7,7 +7,7 @@ class MyVoice(SoundingVoice):
 import asyncio
 import time
 from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Sequence
-from contextlib import AsyncExitStack, aclosing, asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 from functools import partial
 from math import inf
 from typing import Any, ClassVar
@@ -15,32 +15,26 @@ from typing import Any, ClassVar
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Speech
-from engage_hri.schemas.body import BodyPose, Capabilities, Estimate
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Seconds
-from engage_hri.schemas.world import World
 from engage_hri.services.control.contract.bell import Bell
 from engage_hri.services.control.contract.body import (
     BehaviorRefused,
     BodyFailed,
     MovementAuthority,
     Progress,
-    Reached,
 )
-from engage_hri.services.control.contract.refusals import unsupported
 from engage_hri.services.control.voice import player
 from engage_hri.services.control.voice.espeak import EspeakSettings, EspeakSynthesizer
-from engage_hri.services.control.voice.estimate import speech_estimate
-from engage_hri.services.control.voice.outlets import Gag, Nowhere, Outlet, Several
-from engage_hri.services.control.voice.parts import Part, expected, joined, silent, sounding, unspeakable
-from engage_hri.services.control.voice.phrases import Piece, pieces
+from engage_hri.services.control.voice.outlets import Gag, Outlet, Several
+from engage_hri.services.control.voice.parts import Part, expected, joined, silent, sounding
 from engage_hri.services.control.voice.settings import VoiceSettings
-from engage_hri.services.control.voice.speaker import FAULTS, Speaker, speech, voiceless
+from engage_hri.services.control.voice.speaker import Speaker
 from engage_hri.services.control.voice.speaking import Parts, utter_parts
 from engage_hri.services.control.voice.studio import MAKING, Studio
 from engage_hri.services.control.voice.synthesis import SynthesisFailed, Synthesizer
-from engage_hri.services.control.voice.timeline import utter, uttered
+from engage_hri.services.control.voice.timeline import Piece, Utterance, pieces, utter, uttered
 from engage_hri.services.control.voice.wav import WavFile
 
 
@@ -56,16 +50,14 @@ class SoundingVoice(Speaker):
 
     def __init__(self, settings: Any = None) -> None:
         """Make the voice. settings: None: as they are by default."""
-        super().__init__()
+        super().__init__(self.name)
         self._settings: VoiceSettings = self.Settings() if settings is None else settings
-        self.capabilities = Capabilities(body=self.name, types=("speech",), parts=("voice",), faults=FAULTS)
         self._loop = asyncio.get_running_loop()
         takes = self.synthesizer.Settings is not None
         self._studio = Studio(self.synthesizer, self._settings if takes else None, self._settings.phrase_limit)
         self._studio.on_fault = lambda fault: self.on_fault(fault)
-        self._outlet = Gag(Nowhere(self._loop.time), self._loop.time)
+        self._outlet = Gag(Outlet(self._loop.time), self._loop.time)
         self._player: player.Player | None = None
-        self._wav: WavFile | None = None
         self._pace = 1.0
         """How much longer this voice takes than the model of `timeline`, from what it has said so far."""
 
@@ -98,8 +90,7 @@ class SoundingVoice(Speaker):
                 await stack.enter_async_context(self._player.connected())
                 outlets.append(self._player)
             if self._settings.file:
-                self._wav = stack.enter_context(self._file())
-                outlets.append(self._wav)
+                outlets.append(stack.enter_context(self._file()))
             for each in outlets:
                 stack.callback(each.watch(partial(self._tell_fault, each)))
                 self._tell_fault(each)
@@ -132,23 +123,14 @@ class SoundingVoice(Speaker):
             return None
         return self._studio.asked(phrases, self._settings.patience)
 
-    def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
-        if not isinstance(behavior, Speech):
-            return unsupported(behavior)
-        if self._is_voiceless:
-            return unspeakable(behavior, voiceless(behavior))
+    def timed(self, behavior: Speech) -> Utterance:
         found = pieces(behavior, self._settings.language)
         if not found:
-            return speech_estimate(behavior, uttered(behavior), pose or BodyPose())
+            return uttered(behavior)
         self._studio.ask([piece.phrase for piece in found], self._wait)
-        try:
-            parts = [self._part(piece) or expected(piece, self._pace) for piece in found]
-        except SynthesisFailed as error:
-            return unspeakable(behavior, error.fault)
-        warnings = [each for piece in found for each in self.synthesizer.warnings(piece.phrase)]
-        return speech_estimate(behavior, joined(parts, len(behavior.text)), pose or BodyPose(), warnings)
+        return joined([self.part(piece) or expected(piece, self._pace) for piece in found])
 
-    def _part(self, piece: Piece) -> Part | None:
+    def part(self, piece: Piece) -> Part | None:
         """The part of a phrase, if it is synthesized. Raises SynthesisFailed."""
         clause = self._studio.known(piece.phrase)
         if clause is None:
@@ -160,69 +142,51 @@ class SoundingVoice(Speaker):
 
     # -- speaking -----------------------------------------------------------------------------------------------
 
-    async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-        behavior = speech(behavior)
-        if self._is_voiceless:
-            raise BehaviorRefused(voiceless(behavior))
-        await self._voice.wait_for_silence(authority)
-        if authority.revoked is not None:
-            return
+    async def said(self, behavior: Speech, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         if self._player is not None:
             await self._player.ready()
             if (fault := self._player.fault) is not None:
                 raise BehaviorRefused(replace(fault, where=behavior.id))
-        if self._wav is not None:
-            self._wav.revive()
         self._outlet.revive()
-        parts = _Phrases(behavior, self)
-        if (refused := parts.refused()) is not None:
-            raise BehaviorRefused(replace(refused, where=behavior.id))
-        words = utter_parts(behavior, authority, parts, self._outlet, lambda shapes: self.on_lips(shapes))
-        async with aclosing(self._voice.say(behavior, authority, words)) as utterance:
-            async for progress in utterance:
-                yield progress
-                if isinstance(progress, Reached) and progress.sync == "end":
-                    return
-        if self._is_voiceless:
-            raise BodyFailed(voiceless(behavior))
+        parts = _Phrases(behavior, self, self._studio)
+        try:
+            parts.part(0)
+        except BodyFailed as error:
+            raise BehaviorRefused(error.fault) from error
+        return utter_parts(behavior, authority, parts, self._outlet, lambda shapes: self.on_lips(shapes))
 
-    def parts_of(self, behavior: Speech) -> Sequence[Piece]:
+    def pieces_of(self, behavior: Speech) -> Sequence[Piece]:
         """Cut a speech into phrases, and have them synthesized."""
         found = pieces(behavior, self._settings.language)
-        self._studio.ask([piece.phrase for piece in found], self._wait, first=True)
+        self.want(found)
         return found
+
+    def want(self, asked: Sequence[Piece]) -> None:
+        """Ask for phrases, before all others."""
+        self._studio.ask([piece.phrase for piece in asked], self._wait, first=True)
 
 
 class _Phrases(Parts):
     """The parts of a speech, as its phrases are synthesized."""
 
-    def __init__(self, behavior: Speech, voice: SoundingVoice) -> None:
-        self._behavior, self._voice = behavior, voice
-        self._pieces = voice.parts_of(behavior)
-
-    def refused(self) -> Fault | None:
-        """The reason why the first phrase cannot be said; None: it can, or it is not known yet."""
-        try:
-            self.part(0)
-        except BodyFailed as error:
-            return error.fault
-        return None
+    def __init__(self, behavior: Speech, voice: SoundingVoice, studio: Studio) -> None:
+        self._behavior, self._voice, self._studio = behavior, voice, studio
+        self._pieces = voice.pieces_of(behavior)
 
     def part(self, number: int) -> Part | None:
         if not self._pieces:
             return silent(self._behavior)
-        voice, piece = self._voice, self._pieces[number]
+        piece = self._pieces[number]
         try:
-            if (part := voice._part(piece)) is None:
-                voice._studio.ask([piece.phrase], voice._wait, first=True)
-                part = voice._part(piece)
+            if (part := self._voice.part(piece)) is None:
+                self._voice.want([piece])
+                part = self._voice.part(piece)
             return part
         except SynthesisFailed as error:
             raise BodyFailed(replace(error.fault, where=self._behavior.id)) from error
 
     def watch(self, bell: Bell) -> Callable[[], None]:
-        self._voice._studio.watch(bell)
-        return lambda: self._voice._studio.unwatch(bell)
+        return self._studio.watch(bell)
 
 
 class EspeakVoice(SoundingVoice):

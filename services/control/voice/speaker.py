@@ -1,15 +1,53 @@
-"""Base of the voices that are bodies of one part, with sound or without."""
+"""Bodies of one part that speak: their base, and estimates of what they say."""
 
-from collections.abc import Sequence
+from collections.abc import AsyncGenerator, Sequence
+from contextlib import aclosing
+from itertools import pairwise
 
+from msgspec.structs import replace
+
+from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior, Speech
-from engage_hri.schemas.body import BodyPose
+from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, Phase, WordTime
 from engage_hri.schemas.body_faults import BodyFault
+from engage_hri.schemas.documents.prosody import unread
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.world import World
-from engage_hri.services.control.contract.body import BehaviorRefused, Body, BodyState
+from engage_hri.services.control.contract.body import (
+    BehaviorRefused,
+    Body,
+    BodyFailed,
+    BodyState,
+    MovementAuthority,
+    Progress,
+    Reached,
+)
+from engage_hri.services.control.contract.refusals import infeasible, unsupported
+from engage_hri.services.control.voice.synthesis import SynthesisFailed
+from engage_hri.services.control.voice.timeline import Utterance
 from engage_hri.services.control.voice.voice import Voice
+
+
+def speech_estimate(behavior: Speech, utterance: Utterance, pose: BodyPose | None) -> Estimate:
+    """Estimate a speech from its time line: the voice can wait at the marks between two words.
+
+    pose: the one of the body that speaks, which it leaves as it is.
+    """
+    times = {"start": 0.0, **{mark.id: utterance.said_by(mark.position) for mark in behavior.marks}}
+    times["end"] = utterance.seconds
+    gaps = {mark.id for mark in behavior.marks if utterance.is_gap(mark.position)}
+    phases = []
+    for since, to in pairwise(sync_points(behavior)):
+        seconds = times[to] - times[since]
+        longest = None if to in gaps or not seconds else seconds
+        phases.append(Phase(since=since, to=to, shortest=seconds, natural=seconds, longest=longest, hold=to in gaps))
+    words = tuple([WordTime(position=word.position, start=word.start, end=word.end) for word in utterance.words])
+    return Estimate(
+        behavior=behavior.id, feasible=True, degraded="; ".join(unread(behavior)),
+        parts=("voice",), phases=tuple(phases), words=words, pose_after=pose, pose_end=pose,
+    )  # fmt: skip
+
 
 FAULTS = ("mute", "voiceless")
 """Kinds of faults that it can play."""
@@ -18,9 +56,47 @@ FAULTS = ("mute", "voiceless")
 class Speaker(Body):
     """A body with the one part `voice`. A subclass says how long a speech takes, and says it."""
 
-    def __init__(self) -> None:
+    def __init__(self, name: str) -> None:
+        self.capabilities = Capabilities(body=name, types=("speech",), parts=("voice",), faults=FAULTS)
         self._voice = Voice()
         self._faults: tuple[BodyFault, ...] = ()
+
+    def timed(self, behavior: Speech) -> Utterance:
+        """Lay a speech out in time. Raises SynthesisFailed: it cannot be said."""
+        raise NotImplementedError
+
+    async def said(self, behavior: Speech, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
+        """Get ready for a speech, and return what is told of it as it is said. Raises BehaviorRefused."""
+        raise NotImplementedError
+
+    def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
+        if not isinstance(behavior, Speech):
+            return unsupported(behavior)
+        try:
+            if self._is_voiceless:
+                raise SynthesisFailed(voiceless(behavior))
+            return speech_estimate(behavior, self.timed(behavior), pose or BodyPose())
+        except SynthesisFailed as error:
+            fault = replace(error.fault, where=behavior.id)
+            return infeasible(behavior.id, "CANNOT_CREATE_BEHAVIOR", fault)
+
+    async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
+        if not isinstance(behavior, Speech):
+            reason = f"this voice has no {type_name(behavior)}"
+            raise BehaviorRefused(Fault(reason=reason, where=behavior.id, service="control"))
+        if self._is_voiceless:
+            raise BehaviorRefused(voiceless(behavior))
+        await self._voice.wait_for_silence(authority)
+        if authority.revoked is not None:
+            return
+        words = await self.said(behavior, authority)
+        async with aclosing(self._voice.say(behavior, authority, words)) as utterance:
+            async for progress in utterance:
+                yield progress
+                if isinstance(progress, Reached) and progress.sync == "end":
+                    return
+        if self._is_voiceless:
+            raise BodyFailed(voiceless(behavior))
 
     @property
     def faults(self) -> tuple[BodyFault, ...]:
@@ -54,11 +130,3 @@ class Speaker(Body):
 def voiceless(behavior: BlockBehavior) -> Fault:
     """Say why a voice that knows that it is mute does not speak."""
     return Fault(reason="the voice cannot speak", where=behavior.id, service="control")
-
-
-def speech(behavior: BlockBehavior) -> Speech:
-    """The behavior, if it is a speech. Raises BehaviorRefused."""
-    if not isinstance(behavior, Speech):
-        reason = f"this voice has no {type_name(behavior)}"
-        raise BehaviorRefused(Fault(reason=reason, where=behavior.id, service="control"))
-    return behavior

@@ -24,9 +24,8 @@ from engage_hri.services.control.contract.body import (
     Reached,
     Spoke,
 )
-from engage_hri.services.control.voice.outlets import Nowhere, Outlet
-from engage_hri.services.control.voice.parts import Part, silent
-from engage_hri.services.control.voice.score import FADE, Cut, Gap, Item, More, faded, items_of
+from engage_hri.services.control.voice.outlets import Outlet
+from engage_hri.services.control.voice.parts import FADE, Cut, Gap, Item, More, Part, faded, items_of, silent
 from engage_hri.services.control.voice.visemes import Lips
 
 OnLips = Callable[[Sequence[MouthShape]], None]
@@ -61,7 +60,7 @@ async def speak(behavior: Speech, authority: MovementAuthority, pace: float = 1.
     """Say a text in silence, word by word. pace: 2 takes twice as long. Like `utter_parts`."""
     bell = Bell()
     parts = OnePart(silent(behavior, pace))
-    async with aclosing(utter_parts(behavior, authority, parts, Nowhere(bell.now))) as progress:
+    async with aclosing(utter_parts(behavior, authority, parts, Outlet(bell.now))) as progress:
         async for each in progress:
             yield each
 

@@ -164,13 +164,10 @@ class Studio:
             loop.add_reader(self._process.stdout.fileno(), self._go_on)
             self._expect(self._asked)
 
-    def watch(self, bell: Bell) -> None:
-        """Ring a bell at each answer, until `unwatch`."""
+    def watch(self, bell: Bell) -> Callable[[], None]:
+        """Ring a bell at each answer, until the returned function is called."""
         self._bells.append(bell)
-
-    def unwatch(self, bell: Bell) -> None:
-        """Ring it no more."""
-        self._bells.remove(bell)
+        return lambda: self._bells.remove(bell)
 
     def close(self) -> None:
         """End the process. Asking starts it again."""

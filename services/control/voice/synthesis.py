@@ -87,16 +87,6 @@ class Synthesizer(ABC):
             SynthesisFailed: it cannot be said, as in a language that the engine does not have.
         """
 
-    @classmethod
-    def warnings(cls, phrase: Phrase) -> tuple[str, ...]:
-        """Say what of a phrase would not be said as it is meant, as words in a script that the engine does not read.
-
-        It is asked where the phrase is estimated, before the engine has seen it. By default nothing is known.
-
-        phrase: what is to be said.
-        """
-        return ()
-
 
 def refused(reason: str, advice: str = "") -> SynthesisFailed:
     """Make the error of a phrase that cannot be said.

@@ -12,6 +12,7 @@ from typing import BinaryIO
 
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.voice.outlets import Outlet
 
 COMMENT_SIZE = 80
 _HEADER = 12 + 24 + 8 + 4 + 8 + COMMENT_SIZE + 8
@@ -19,20 +20,16 @@ LARGEST = 2**32 - 2**16
 """Bytes of sound in one file: its header has no room for more."""
 
 
-class WavFile:
+class WavFile(Outlet):
     """An outlet into a file. It takes what it is given at once, so it needs no lead."""
-
-    lead: Seconds = 0.0
-    is_live = False
 
     def __init__(self, file: BinaryIO, name: str, rate: int, origin: Seconds, now: Callable[[], Seconds]) -> None:
         """Begin an empty file. file: unbuffered. rate: samples per second. origin: the loop time of its second 0."""
-        self.fault: Fault | None = None
-        self._file, self._name, self._rate, self._origin, self._now = file, name, rate, origin, now
+        super().__init__(now)
+        self._file, self._name, self._rate, self._origin = file, name, rate, origin
         self._size = 0
         self._is_told = False
         """Its fault is known, and told again only after it has taken sound."""
-        self._on_fault: list[Callable[[], None]] = []
         self._write(0, _header(0, rate, origin))
 
     def __enter__(self) -> "WavFile":
@@ -42,11 +39,7 @@ class WavFile:
         self._file.close()
 
     def revive(self) -> None:
-        """Try again after a fault: there may be room now."""
-        self.fault = None
-
-    def earliest(self) -> Seconds:
-        return self._now()
+        self._fault = None  # there may be room now
 
     def play(self, samples: bytes, at: Seconds) -> None:
         if self.fault is not None:
@@ -59,12 +52,6 @@ class WavFile:
             self._size = max(self._size, place + len(samples))
             self._is_told = not self._write(0, _header(self._size, self._rate, self._origin))
 
-    def rest(self) -> None:
-        """Need nothing: what is not written is silence."""
-
-    def late(self) -> Seconds | None:
-        return None
-
     def cut(self, at: Seconds, tail: bytes) -> None:
         size = max(0, round((at - self._origin) * self._rate)) * 2
         if self.fault is None and size < self._size:
@@ -72,10 +59,6 @@ class WavFile:
             self._write(max(_HEADER, _HEADER + size - len(tail)), tail)
             self._file.truncate(_HEADER + size)
             self._write(0, _header(size, self._rate, self._origin))
-
-    def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
-        self._on_fault.append(on_fault)
-        return lambda: self._on_fault.remove(on_fault)
 
     def _write(self, place: int, content: bytes) -> bool:
         try:
@@ -88,10 +71,10 @@ class WavFile:
 
     def _fail(self, reason: str, advice: str) -> None:
         reason = f"the sound file {self._name}: {reason}"
-        self.fault = Fault(reason=reason, where=self._name, advice=advice, service="control")
+        self._fault = Fault(reason=reason, where=self._name, advice=advice, service="control")
         is_told, self._is_told = self._is_told, True
-        for each in () if is_told else list(self._on_fault):
-            each()
+        if not is_told:
+            self.tell_fault()
 
 
 def _header(size: int, rate: int, origin: Seconds) -> bytes:

@@ -4,7 +4,7 @@ from typing import get_args
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import UNDECLARED, Unknown
+from engage_hri.schemas.behaviors import Unknown
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import WarningKind
@@ -13,8 +13,6 @@ from engage_hri.schemas.vocabulary import unperformed
 
 def unknown(behavior: Unknown) -> tuple[WarningKind, str]:
     """Kind and reason of the warning about a behavior that nobody here knows, or that does not say what to do."""
-    if behavior.namespace.startswith(UNDECLARED):
-        return "CUSTOM_BEHAVIOR_NOT_SUPPORTED", f"the prefix of <{behavior.element}> is not declared"
     if behavior.namespace:
         return "CUSTOM_BEHAVIOR_NOT_SUPPORTED", f"<{behavior.element}> is of namespace {behavior.namespace!r}"
     if behavior.lacks:

@@ -241,7 +241,7 @@ def test_each_fault_is_described():
         (BodyFault(kind="drunk"), "cannot play 'drunk'"),
         (BodyFault(kind="slow", part="tail"), "slow of 'tail'"),
         (BodyFault(kind="slow", amount=0.5), "expected 1..20"),
-        (BodyFault(kind="stalled", amount=2.0), "expected none"),
+        (BodyFault(kind="stalled", amount=2.0), "takes no amount"),
         (BodyFault(kind="stalled", before="stroke"), "takes no before"),
         (BodyFault(kind="blocked", part="face"), "blocked of 'face'"),
     ],

@@ -13,9 +13,8 @@ image = pytest.importorskip("PIL.Image", reason="needs the extra `mujoco`")
 
 from engage_hri.schemas.behaviors import FaceLexeme, Gaze, Pointing, Speech
 from engage_hri.schemas.faults import InputRefused, RunFailed
-from engage_hri.services.control.bases.composed import composed
+from engage_hri.services.control.bases.composed import Member, composed
 from engage_hri.services.control.bases.driver_guard import GuardedBody
-from engage_hri.services.control.bases.members import Member
 from engage_hri.services.control.contract.body import MouthShape
 from engage_hri.services.control.mujoco.body import MujocoBody
 from engage_hri.services.control.mujoco.film import Film, check, filmed, show_face

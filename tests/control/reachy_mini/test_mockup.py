@@ -209,7 +209,7 @@ async def test_without_a_daemon_it_says_where_it_looked_and_how_to_start_one() -
         async with body.connected():
             raise AssertionError("connected to nothing")
 
-    assert "the daemon at http://127.0.0.1:9 cannot be reached: nothing listens there" in failed.value.fault.reason
+    assert "the daemon at http://127.0.0.1:9 cannot be reached: Cannot connect to host" in failed.value.fault.reason
     assert "reachy-mini-daemon" in failed.value.fault.advice
     assert "--set control.drivers.reachy_mini.url=" in failed.value.fault.advice
 

@@ -10,7 +10,8 @@ from pathlib import Path
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.services.client.robot import Robot, connect
+from engage_hri.services.client.connection import connect
+from engage_hri.services.client.robot import Robot
 from engage_hri.services.commandline.robot.certificates import initialize
 from tests.access.fortress import Told
 from tests.bus.places import OWN_ADDRESS, free_endpoint
