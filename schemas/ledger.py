@@ -30,7 +30,7 @@ class Step(Struct, frozen=True, kw_only=True, omit_defaults=True):
     `state`; it is not repeated here. key, source, content: of any other input, whole: a message, where a request has
     the name that the service knows it by as its id; or, without a key, what came by no bus, as `intake.py` of the
     service says. at: local time of arrival, if it is not `now`. clocks: those that were read. led_to: fingerprint of
-    all that followed; empty: nothing.
+    all that followed; empty: nothing. is_same_turn: no task of the service ran between the step before and this one.
     """
 
     now: Seconds
@@ -43,6 +43,7 @@ class Step(Struct, frozen=True, kw_only=True, omit_defaults=True):
     past: bool = False
     clocks: tuple[ReadClock, ...] = ()
     led_to: str = ""
+    is_same_turn: bool = False
 
 
 class Taken(Struct, frozen=True, kw_only=True, tag="taken", omit_defaults=True):

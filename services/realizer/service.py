@@ -45,6 +45,7 @@ from engage_hri.services.realizer.together.planning import Planning
 from engage_hri.services.realizer.together.waiting_block import WaitingBlock
 from engage_hri.services.requests.ends import Patience, RequestDesk, Requester
 from engage_hri.services.requests.silence import unfinished
+from engage_hri.services.runtime.noted import NotedInputs
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 
@@ -70,7 +71,8 @@ class _Realizer:
         """How the blocks have ended that are over, by id."""
         self.homing: set[asyncio.Future[Outcome]] = set()
         """Outcomes of the parts that are on their way home, sent by blocks that replace others."""
-        self.planning = Planning(bus, self.live_blocks, lambda: self.shared.performed())
+        self.noted = NotedInputs(bus, "realizer")
+        self.planning = Planning(bus, self.live_blocks, lambda: self.shared.performed(), self.noted.take_own)
         self.steering = Steering(bus, self.desk, config, self.live, self.performances, self.live_blocks)
         self.shared = SharedContext(
             bus, self.requests, config, self.peers, self.routes, self.performing, self.live_blocks,
@@ -318,10 +320,14 @@ async def realize(bus: Bus, ready: Ready, config: RealizerConfig) -> None:
             tell_settings(bus, "realizer", config)
             ready()
             async with asyncio.TaskGroup() as tasks:
+                is_same_turn = False
                 async for received in inbox:
                     with bus.containing(received):
+                        realizer.noted.take(received, is_same_turn=is_same_turn)
                         realizer.take(received, tasks)
+                    is_same_turn = len(inbox) > 0
     finally:
+        realizer.noted.close()
         realizer.steering.close()
         realizer.desk.close()
         realizer.requests.close()

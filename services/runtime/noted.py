@@ -5,12 +5,14 @@ from math import isfinite
 from typing import Any
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.ledger import ReadClock, Step
 from engage_hri.schemas.recognition import session_of
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.bus.interface import Bus
+from engage_hri.services.bus.interface import Bus, Received
+from engage_hri.services.runtime.alarm import Alarm
 from engage_hri.services.runtime.intake import Input, Intake
 from engage_hri.services.runtime.ledger import Ledger, StepClock, step_of
 
@@ -98,3 +100,51 @@ class NotedIntake:
                     self._bus.publish(self._key, told)
         for output in outputs:
             self._carry_out(output)
+
+
+class NotedInputs:
+    """Inputs of a service that works in tasks, with a ledger: what it took, and not what each led to.
+
+    Between two inputs its tasks run as the loop has them, so nobody can say what followed from which.
+    """
+
+    def __init__(self, bus: Bus, service: str) -> None:
+        self._bus = bus
+        self._key = keys.taken(service)
+        self._clock = BusClock(bus)
+        self._ledger = Ledger(service, session_of(bus.run), bus.clock, bus.now())
+        self._alarm = Alarm(self._tell)
+
+    def take(self, received: Received, *, is_same_turn: bool = False) -> None:
+        """Note a message. is_same_turn: as of `Step`."""
+        message, now = received.message, self._bus.now()
+        self._clock.begin()
+        for stamp in (getattr(message, "at", None), getattr(message, "arrived", None)):
+            if isinstance(stamp, Stamp):
+                self._clock.local(stamp, now)
+        input = Input(received.key, message, received.source, received.at, received.past, received.life)
+        self._note(replace(step_of(input, received.number, now), is_same_turn=is_same_turn))
+
+    def take_own(self, content: Struct) -> None:
+        """Note what came by no bus."""
+        now = self._bus.now()
+        self._clock.begin()
+        self._note(step_of(Input("", content, "", now), 0, now))
+
+    def close(self) -> None:
+        """Tell what is not told yet."""
+        self._alarm.stop()
+        self._tell()
+
+    def _note(self, step: Step) -> None:
+        self._ledger.note(step, self._clock.were_read, ())
+        if self._ledger.is_full:
+            self._tell()
+        else:
+            self._alarm.set(self._ledger.deadline)
+
+    def _tell(self) -> None:
+        told = self._ledger.portion(self._bus.now(), is_heard=self._bus.is_heard(self._key))
+        if told is not None:
+            self._bus.publish(self._key, told)
+        self._alarm.set(self._ledger.deadline)

@@ -7,6 +7,7 @@ import math
 import selectors
 from collections.abc import Callable, Coroutine
 from contextvars import Context
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar, TypeVarTuple, Unpack
 
@@ -59,16 +60,16 @@ class _Timer(asyncio.TimerHandle):
 
 
 class VirtualTimeLoop(asyncio.SelectorEventLoop):
-    """An event loop that starts at second 0. `loop.time()` moves only when nothing else is left to do.
+    """An event loop that starts at second `begin`. `loop.time()` moves only when nothing else is left to do.
 
     Nothing outside the loop may wake it: no sockets, threads or processes, which take real time.
     limit: the second at which TimeRanOut is raised; with a timer that repeats there is never a Deadlock.
     """
 
-    def __init__(self, limit: float = math.inf) -> None:
+    def __init__(self, limit: float = math.inf, begin: float = 0.0) -> None:
         self._limit = limit
         self._timers = itertools.count()
-        self._virtual_now = 0.0
+        self._virtual_now = begin
         selector = _InstantSelector()
         selector.loop = self
         super().__init__(selector)
@@ -109,7 +110,10 @@ def _whereabouts(task: "asyncio.Task[Any]") -> str:
     return f"{task.get_name()}{place}"
 
 
-def run_virtual(main: Coroutine[Any, Any, T]) -> T:
-    """Run a coroutine as `asyncio.run` does, on a virtual clock. Raises Deadlock where real time would hang."""
-    with asyncio.Runner(loop_factory=VirtualTimeLoop) as runner:
+def run_virtual(main: Coroutine[Any, Any, T], begin: float = 0.0) -> T:
+    """Run a coroutine as `asyncio.run` does, on a virtual clock. Raises Deadlock where real time would hang.
+
+    begin: second at which the clock begins.
+    """
+    with asyncio.Runner(loop_factory=partial(VirtualTimeLoop, begin=begin)) as runner:
         return runner.run(main)

@@ -33,7 +33,7 @@ THINGS = ("cup", "plate")
 
 
 def test_the_anchor_scenario_gives_the_same_events(task: Recording) -> None:
-    control, life = again(task)
+    control, life = again(task, services=("control", "recognition"))
 
     assert life.lack.is_nothing
     assert len(life.live) > 200
@@ -45,7 +45,9 @@ def test_the_anchor_scenario_gives_the_same_events(task: Recording) -> None:
 async def test_raw_perception_gives_the_same_events(tmp_path: Path) -> None:
     await tangram(tmp_path / "a.mcap", Config(simulation=SimulationConfig(human="appendix-b", perception="raw")))
 
-    life = next(life for life in again(read(tmp_path / "a.mcap")) if life.service == "recognition")
+    life = next(
+        life for life in again(read(tmp_path / "a.mcap"), services=("recognition",)) if life.service == "recognition"
+    )
 
     assert life.lack.is_nothing
     assert len(life.live) > 100

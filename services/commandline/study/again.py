@@ -4,7 +4,7 @@ Which service is played how is in one table, `SERVICES`: a new one is a row.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,18 +17,21 @@ from engage_hri.schemas.explained import explained
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.ledger import Step, Taken
 from engage_hri.schemas.recognition import ConnectionEvent, session_of
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.samples import Received
 from engage_hri.services.commandline.shell.process import DONE
 from engage_hri.services.commandline.shell.recording_file import opened
 from engage_hri.services.commandline.shell.settings import RobotConfig
+from engage_hri.services.commandline.study.realizer_again import OtherWords, Said, compared, played
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.serving.intake import ControlIntake
 from engage_hri.services.control.serving.steps import ControlStep
+from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.recognition import intake as recognition
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.settings import flat, settings_of
-from engage_hri.services.runtime.again import Again, Lack, StepDifference
+from engage_hri.services.runtime.again import Again, Find, Lack, StepDifference
 from engage_hri.services.runtime.configuration import read
 from engage_hri.services.runtime.intake import Intake, PublishMessage
 from engage_hri.services.runtime.ledger import StepClock
@@ -58,10 +61,15 @@ SERVICES = {
 }
 
 
+ALL = (*SERVICES, "realizer")
+"""Services that can be played to."""
+
+
 class Compared(Struct, frozen=True, kw_only=True):
     """One life of a service, live and again. differences: steps that led to something else again, in order.
 
-    live, again: changes of connection events that it published; only recognition has some.
+    live, again: changes of connection events that it published; only recognition has some. other_words: messages that
+    say something else again, and furthest: greatest difference of times of all others; only of the realizer.
     """
 
     service: str
@@ -71,10 +79,12 @@ class Compared(Struct, frozen=True, kw_only=True):
     lack: Lack
     live: tuple[ConnectionEvent, ...] = ()
     again: tuple[ConnectionEvent, ...] = ()
+    other_words: tuple[OtherWords, ...] = ()
+    furthest: Seconds = 0.0
 
     @property
     def is_same(self) -> bool:
-        return not self.differences
+        return not self.differences and not self.other_words
 
     def changed_events(self) -> list[tuple[ConnectionEvent | None, ConnectionEvent | None]]:
         """Changes of events that only one side has, or that differ: of one event and state together.
@@ -103,15 +113,17 @@ class Compared(Struct, frozen=True, kw_only=True):
         return one == other
 
 
-def again(recording: Recording, settings: Sequence[str] = ()) -> list[Compared]:
-    """Play it to each life of each service once more; with settings, `SERVICE.KEY=VALUE`, to those services alone.
+def again(recording: Recording, settings: Sequence[str] = (), services: Iterable[str] = ALL) -> list[Compared]:
+    """Play it to each life of these services once more; with settings, `SERVICE.KEY=VALUE`, to those alone.
 
+    The realizer runs on an event loop, so nobody may ask for it on another one.
     Raises InputRefused: there is no such setting, or this Engage does not know those that the service had.
     """
     lives: dict[tuple[str, str], Again] = {}
     live: dict[str, list[ConnectionEvent]] = {}
     numbers, configs = _numbers(recording), _configurations(recording)
-    meant = {line.partition(".")[0] for line in settings} or SERVICES.keys()
+    meant = {line.partition(".")[0] for line in settings} or {*services}
+    ledgers: dict[str, list[Taken]] = {}
 
     def find(life: str, number: int) -> Received | None:
         place = numbers.get((life, number & 0xFFFFFFFF))
@@ -129,13 +141,55 @@ def again(recording: Recording, settings: Sequence[str] = ()) -> list[Compared]:
             if name not in lives:
                 lives[name] = _begun(recording.robot, message, configs.get(name), settings)
             lives[name].take(message, find)
-    return [
+        elif isinstance(message, Taken) and message.service == "realizer" and message.service in meant:
+            ledgers.setdefault(message.session, []).append(message)
+    realizers = [_realizer(recording, ledger, configs, settings, find) for ledger in ledgers.values()]
+    return realizers + [
         Compared(
             service=service, session=session, steps=life.steps, differences=tuple(life.differences), lack=life.lack,
             live=tuple(live.get(session, ())) if service == "recognition" else (), again=tuple(_events(life.outputs)),
         )
         for (service, session), life in lives.items()
     ]  # fmt: skip
+
+
+def _realizer(
+    recording: Recording,
+    ledger: Sequence[Taken],
+    configs: Mapping[tuple[str, str], Struct],
+    settings: Sequence[str],
+    find: Find,
+) -> Compared:
+    """One life of the realizer, live and again. If its first steps are missing, it is not played."""
+    first, steps = ledger[0], [step for taken in ledger for step in taken.steps]
+    before, gaps = first.first - 1, ledger[-1].first + len(ledger[-1].steps) - first.first - len(steps)
+    had = configs.get(("realizer", first.session))
+    lack = Lack(settings=had is None, before=before, gaps=gaps)
+    if before:
+        return Compared(service="realizer", session=first.session, steps=0, differences=(), lack=lack)
+    config = had or RealizerConfig()
+    if settings:
+        config = with_settings("realizer", config, settings)
+    assert isinstance(config, RealizerConfig)
+    live = [*_said(recording, first.session)]
+    run = next(
+        (life for place in range(len(recording)) if (life := recording.life(place)).startswith(first.session)), ""
+    )
+    said, missing = played(recording.robot, run, steps, StepClock(first.at.clock), find, config)
+    differ, furthest = compared(live, said, steps[-1].now)
+    return Compared(
+        service="realizer", session=first.session, steps=len(steps), differences=(),
+        lack=structs.replace(lack, messages=missing), other_words=tuple(differ), furthest=furthest,
+    )  # fmt: skip
+
+
+def _said(recording: Recording, session: str) -> Iterable[Said]:
+    """What a life published, as the recording has it."""
+    for place in range(len(recording)):
+        if session_of(recording.life(place)) == session:
+            received = recording.received(place)
+            if received is not None:
+                yield Said(received.key, received.message, received.at)
 
 
 def _begun(robot: str, first: Taken, had: Struct | None, settings: Sequence[str]) -> Again:
@@ -161,9 +215,9 @@ def _configurations(recording: Recording) -> dict[tuple[str, str], Struct]:
     found = {}
     for life in settings_of(recording):
         name = life.told.participant
-        if name not in SERVICES or life.unread:
+        if name not in ALL or life.unread:
             continue
-        config = SERVICES[name].config
+        config = RealizerConfig if name == "realizer" else SERVICES[name].config
         try:
             found[name, session_of(life.told.run)] = msgspec.convert(life.sections.get(name, {}), config)
         except msgspec.ValidationError as error:
@@ -202,7 +256,7 @@ def play_again(paths: Sequence[Path], settings: Sequence[str], console: Console)
     for path in paths:
         lives = again(opened(path), settings)
         if not lives:
-            reason = f"{' and '.join(SERVICES)} told nothing of what they took: none was there, or of another Engage"
+            reason = f"{', '.join(ALL)} told nothing of what they took: none was there, or of another Engage"
             raise InputRefused(Fault(reason=reason, where=str(path)))
         for life in lives:
             for line in told(life, path.name, has_other_settings=bool(settings)):
@@ -223,6 +277,8 @@ def told(life: Compared, name: str, *, has_other_settings: bool) -> list[str]:
         lines.append(f"  {lack.before} steps are from before the recording: what had begun by then is not known")
     if lack.gaps or lack.messages:
         lines.append(f"  {lack.gaps} steps and {lack.messages} messages that it took are missing in the recording")
+    if life.service == "realizer":
+        return [head + _realizer_words(life), *lines, *_word_lines(life.other_words)]
     if life.is_same and not has_other_settings:
         return [f"{head}: again the same, to the last bit", *lines]
     if life.live or life.again:
@@ -245,6 +301,26 @@ def _event_lines(life: Compared) -> tuple[list[str], int]:
     if len(different) > SHOWN:
         lines.append(f"  and {len(different) - SHOWN} more")
     return lines, len(different)
+
+
+def _realizer_words(life: Compared) -> str:
+    if life.lack.before:
+        return ": it is played from its beginning on alone"
+    if life.other_words:
+        return f"; {len(life.other_words)} messages differ"
+    return ": again the same" + (
+        f", at times within {1000 * life.furthest:.1f} ms" if life.furthest else ", to the last bit"
+    )
+
+
+def _word_lines(differences: Sequence[OtherWords]) -> Iterable[str]:
+    """Lines about the first messages of the realizer that differ."""
+    for one in differences[:SHOWN]:
+        said = one.live or one.again
+        assert said is not None
+        yield f"  at {said.at:.3f} s, {type(said.message).__name__} on {said.key}"
+        yield f"    live:  {one.live.message if one.live else 'nothing'}"
+        yield f"    again: {one.again.message if one.again else 'nothing'}"
 
 
 def _step_lines(differences: Sequence[StepDifference]) -> Iterable[str]:

@@ -1,6 +1,7 @@
 """Planning of a block on the bus: the body is asked what its behaviors take, and asked again about the plan."""
 
 import asyncio
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping
 
 from msgspec.structs import replace
@@ -14,6 +15,7 @@ from engage_hri.schemas.faults import EngageError, Fault, NoReply
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.decide.decisions import Decisions
+from engage_hri.services.realizer.inputs import BodyAnswered, behaviors_asked
 from engage_hri.services.realizer.plan.agreement import Rounds
 from engage_hri.services.realizer.plan.handover import hands_refused
 from engage_hri.services.realizer.plan.known import Known, is_foreign, is_named_in
@@ -42,8 +44,17 @@ MOST = 2000
 class Planning:
     """Planning of blocks with the body and with what is known of the other live blocks."""
 
-    def __init__(self, bus: Bus, live_blocks: LiveBlocks, performing: Callable[[], Iterable[Decisions]]) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        live_blocks: LiveBlocks,
+        performing: Callable[[], Iterable[Decisions]],
+        note: Callable[[BodyAnswered], None] = lambda answer: None,
+    ) -> None:
+        """note: called with each answer of the body."""
         self._bus = bus
+        self._note = note
+        self._asked = Counter[str]()
         self._live_blocks = live_blocks
         self._performing = performing
 
@@ -159,18 +170,22 @@ class Planning:
         """Estimates of the body for behaviors of a block. Raises BlockRefused."""
         if not question.items:
             return ()
+        name = behaviors_asked(question)
+        number = self._asked[name] = self._asked[name] + 1
         try:
             answer = await self._bus.query(keys.ESTIMATE, question, timeout=ESTIMATE)
         except NoReply as error:
             unable = error.fault.following("no body performs it", block.id)
             raise BlockRefused(unable, "CANNOT_CREATE_BEHAVIOR") from error
         except EngageError as error:
+            self._note(BodyAnswered(asked=name, number=number, refused=error.fault))
             raise BlockRefused(error.fault, "CANNOT_CREATE_BEHAVIOR") from error
         if not isinstance(answer, Estimates):
             fault = Fault(
                 reason=f"control answered with a {type(answer).__name__}, not with estimates", where=block.id
             )
             raise BlockRefused(fault, "CANNOT_CREATE_BEHAVIOR")
+        self._note(BodyAnswered(asked=name, number=number, answer=answer))
         asked = {item.behavior.id for item in question.items}
         return tuple([each for each in answer.items if each.behavior in asked])  # bodies err
 

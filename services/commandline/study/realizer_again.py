@@ -1,0 +1,246 @@
+"""The realizer once more, over a recording: its own tasks, on a clock that jumps, at a bus that is played.
+
+The realizer decides in tasks that await sync points (docs/realizer.md), so it has no intake that could be asked
+again. It runs as it is: at each instant of its ledger it gets what it got, and what it publishes is held against what
+the recording has of it. Its timers fire to the instant then, and some milliseconds late when it lived; so times count
+as the same if they are within `NEAR`, and the greatest difference is told. Of two inputs in one instant, which only a
+virtual clock has, all that follows from the first comes before the second; when it lived, the second may have come
+between, and a command that is void at once may have been sent or not.
+"""
+
+import asyncio
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from math import inf
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+from msgspec.structs import replace
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.body import EstimateBehaviors, PerformBehavior
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.feedback import PredictionFeedback, SyncPointProgress
+from engage_hri.schemas.ledger import Step
+from engage_hri.schemas.messages import Message, in_form
+from engage_hri.schemas.requests import KeepAlive
+from engage_hri.schemas.status import BusHealth
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.bus.interface import CAPACITY, Answer, Bus, Keep, Subscription, Tap
+from engage_hri.services.bus.samples import Received
+from engage_hri.services.realizer.config import RealizerConfig
+from engage_hri.services.realizer.inputs import BodyAnswered, RealizerInput, behaviors_asked
+from engage_hri.services.realizer.service import realize
+from engage_hri.services.runtime.again import Find
+from engage_hri.services.runtime.ledger import StepClock
+from engage_hri.services.runtime.virtual_time import run_virtual
+
+NEAR: Seconds = 0.05
+"""Greatest difference of times that count as the same: a loop that is so late has stood still (`bus/sight.py`)."""
+TURNS = 40
+"""Turns of the loop from one input to the next of the same instant: what follows from the first comes before."""
+AFTER: Seconds = 0.01
+"""Time for which it runs on after its last input."""
+
+
+class Said(Struct, frozen=True):
+    """A message that the realizer published. at: on its clock, or that of the recording."""
+
+    key: str
+    message: Message
+    at: Seconds
+
+
+class OtherWords(Struct, frozen=True):
+    """A message that only one side has, or that says something else. None: that side has none."""
+
+    live: Said | None
+    again: Said | None
+
+
+class PlayedBus(Bus):
+    """The bus of a participant to whom a ledger is played. said: what it has published, in order."""
+
+    def __init__(self, robot: str, name: str, run: str, clock: StepClock, lives: Iterator[int]) -> None:
+        super().__init__(robot, name, "", clock.name, run, lives)
+        self.said: list[Said] = []
+        self._known = clock
+        self._readers: list[Subscription] = []
+        self._asked = Counter[str]()
+        self._answers: dict[tuple[str, int], asyncio.Future[BodyAnswered]] = {}
+
+    def give(self, received: Received) -> None:
+        """Have it receive a message."""
+        for reader in self._readers:
+            if reader.wants(received.key):
+                reader.offer(received)
+
+    def give_answer(self, answered: BodyAnswered) -> None:
+        """Have a question of it answered, now or when it is asked."""
+        self._answer(answered.asked, answered.number).set_result(answered)
+
+    def _answer(self, asked: str, number: int) -> "asyncio.Future[BodyAnswered]":
+        return self._answers.setdefault((asked, number), asyncio.get_running_loop().create_future())
+
+    async def _query(self, key: str, message: Message, deadline: Seconds) -> Message | None:
+        assert isinstance(message, EstimateBehaviors)
+        name = behaviors_asked(message)
+        self._asked[name] += 1
+        answer = self._answer(name, self._asked[name])
+        await asyncio.wait([answer], timeout=deadline - self.now())
+        if not answer.done():
+            return None
+        if (refused := answer.result().refused) is not None:
+            raise InputRefused(refused)
+        return answer.result().answer
+
+    def _send(self, key: str, message: Message) -> None:
+        in_form(key, message, "msgpack")  # as on a wire: what has no form raises
+        self.said.append(Said(key, message, self.now()))
+
+    def local(self, stamp: Stamp) -> Seconds:
+        return self._known.local(stamp, self.now())
+
+    def error(self, clock: str) -> Seconds:
+        return self._known.error(clock)
+
+    @property
+    def health(self) -> BusHealth:
+        return BusHealth(peers=tuple(keys.SERVICES))
+
+    def withdraw(self, *states: str) -> None:
+        pass
+
+    def is_heard(self, key: str) -> bool:
+        return False
+
+    def subscribe(self, *patterns: str, keep: Keep = Keep.EVERY, capacity: int = 4096) -> Subscription:
+        self._readers.append(reader := Subscription(patterns, keep, capacity, self._readers.remove))
+        return reader
+
+    def tap(self, *patterns: str, capacity: int = CAPACITY) -> Tap:
+        raise NotImplementedError("nobody records what is played")
+
+    def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
+        pass
+
+    def declare_alive(self) -> None:
+        pass
+
+    async def leave(self) -> None:
+        for reader in list(self._readers):
+            reader.close()
+
+
+async def _play(bus: PlayedBus, steps: Sequence[Step], clock: StepClock, find: Find, config: RealizerConfig) -> int:
+    """Run the realizer over the steps. Returns the number of messages that are missing in the recording."""
+    missing, loop = 0, asyncio.get_running_loop()
+    task = asyncio.create_task(realize(bus, lambda: None, config))
+    for _ in range(TURNS):
+        await asyncio.sleep(0)
+    for step, following in zip(steps, (*steps[1:], None), strict=True):
+        clock.read(step.clocks)
+        if step.now > bus.now():
+            due = loop.create_future()
+            loop.call_at(step.now, partial(due.set_result, None))
+            await due
+        if step.content is None:
+            found = find(step.life, step.number)
+        elif isinstance(content := msgspec.convert(step.content, RealizerInput), BodyAnswered):
+            bus.give_answer(content)
+            found = None
+        else:
+            found = Received(step.key, content, step.source, step.now, step.past, step.life)
+        if found is not None:
+            bus.give(replace(found, at=step.now if step.at is None else step.at, past=step.past))
+        missing += found is None and step.content is None
+        for _ in range(0 if following is not None and following.is_same_turn else TURNS):
+            await asyncio.sleep(0)
+    await asyncio.sleep(AFTER)
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+    await bus.leave()
+    return missing
+
+
+def played(
+    robot: str, run: str, steps: Sequence[Step], clock: StepClock, find: Find, config: RealizerConfig
+) -> tuple[list[Said], int]:
+    """What the realizer says once more, and how many messages it took are missing in the recording.
+
+    run: its life. steps: all of that life, from the first on.
+    """
+
+    async def play() -> tuple[list[Said], int]:
+        bus = PlayedBus(robot, "realizer", run, clock, iter(range(1, 1 << 30)))
+        missing = await _play(bus, steps, clock, find, config)
+        return bus.said, missing
+
+    return run_virtual(play(), begin=steps[0].now)
+
+
+# -- comparison -------------------------------------------------------------------------------------------------
+
+
+def compared(live: Iterable[Said], again: Iterable[Said], until: Seconds) -> tuple[list[OtherWords], Seconds]:
+    """Messages that differ, in order, and the greatest difference of times of the others.
+
+    until: instant from which on nothing counts: the recording may have ended in between.
+    """
+    before, now = _named(live), _named(again)
+    differ, furthest = [], 0.0
+    for name in [*before, *(name for name in now if name not in before)]:
+        one, other = before.get(name), now.get(name)
+        off = inf if one is None or other is None else distance(_plain(one.message), _plain(other.message))
+        if off <= NEAR:
+            furthest = max(furthest, off)
+        elif min(each.at for each in (one, other) if each is not None) < until:
+            differ.append(OtherWords(one, other))
+    return differ, furthest
+
+
+def _named(said: Iterable[Said]) -> Mapping[tuple[object, ...], Said]:
+    """Messages by what they are about, and how often that was told before.
+
+    Left out is what comes with the clock: renewals, predictions, and another pace for a behavior that may go on as
+    far as before.
+    """
+    told, named = Counter[tuple[object, ...]](), dict[tuple[object, ...], Said]()
+    for each in said:
+        message = each.message
+        if isinstance(message, KeepAlive | PredictionFeedback) or keys.key_class(each.key) not in ("evt", "cmd"):
+            continue
+        if keys.matches(keys.ANY_TAKEN, each.key):
+            continue
+        about = [getattr(message, name, None) for name in ("id", "block", "behavior", "sync", "event", "through")]
+        name = (each.key, type(message).__name__, *map(str, about), getattr(message, "held", None))
+        if not (isinstance(message, PerformBehavior) and told[name]):
+            named[*name, told[name]] = each
+        told[name] += 1
+    return named
+
+
+def _plain(message: Message) -> Any:
+    """The message as plain values, without what is no deed: expectations, and numbers of updates."""
+    match message:
+        case SyncPointProgress():
+            message = replace(message, predicted=None)
+        case PerformBehavior():
+            message = replace(message, pace=(), revision=0)
+    return msgspec.to_builtins(message)
+
+
+def distance(one: Any, other: Any) -> float:
+    """Greatest difference of two numbers at the same place; inf: they differ in anything else."""
+    match one, other:
+        case ((bool() | str() | None), _):
+            return 0.0 if one == other else inf
+        case ((int() | float()), (int() | float())):
+            return abs(one - other)
+        case dict(), dict() if one.keys() == other.keys():
+            return max((distance(one[key], other[key]) for key in one), default=0.0)
+        case ((list() | tuple()), (list() | tuple())) if len(one) == len(other):
+            return max(map(distance, one, other), default=0.0)
+    return inf
