@@ -24,6 +24,7 @@ from engage_hri.services.client.language_models import perform_call
 from engage_hri.services.client.people.perceive import perceive
 from engage_hri.services.client.people.perceived_person import PerceivedPerson
 from engage_hri.services.client.robot import Robot
+from engage_hri.services.commandline.embedding import play_tangram
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import Config, load
 from engage_hri.services.console.follow import following
