@@ -7,7 +7,6 @@ from functools import partial
 from typing import Any
 
 import pytest
-from engage_hri.services.commandline.study.tangram import play_tangram
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys

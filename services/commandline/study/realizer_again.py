@@ -182,7 +182,9 @@ def played(
 # -- comparison -------------------------------------------------------------------------------------------------
 
 
-def compared(live: Iterable[SentMessage], again: Iterable[SentMessage], until: Seconds) -> tuple[list[OtherWords], Seconds]:
+def compared(
+    live: Iterable[SentMessage], again: Iterable[SentMessage], until: Seconds
+) -> tuple[list[OtherWords], Seconds]:
     """Messages that differ, in order, and the greatest difference of times of the others.
 
     until: instant from which on nothing counts: the recording may have ended in between.
