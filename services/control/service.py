@@ -15,7 +15,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.body_faults import BodyFault, SwitchFaults
 from engage_hri.schemas.covered import COVERED_FOR
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.requests import Accepted, Refused, Request
+from engage_hri.schemas.requests import Request
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Received, is_asked_to_stop
@@ -190,12 +190,8 @@ class _Control:
         match output:
             case PublishMessage(key=key, message=message):
                 self._bus.publish(key, message)
-            case AnswerRequest(answer=Accepted(id=id)):
-                self.desk.accept(id)
-            case AnswerRequest(answer=Refused(id=id, fault=fault)):
-                self.desk.refuse(id, fault)
-            case AnswerRequest(answer=outcome):
-                self.desk.end(outcome)
+            case AnswerRequest(answer=answer):
+                self.desk.answer(answer)
             case effects.Alert(fault=fault):
                 warn(self._bus, fault)
             case effects.Reassure(text=text):

@@ -6,7 +6,7 @@ from msgspec import Struct
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.recognition import RequestEvent, SignalTurn, session_of
-from engage_hri.schemas.requests import Accepted, Cancel, Refused
+from engage_hri.schemas.requests import Cancel
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.bus.sight import LATE
 from engage_hri.services.recognition.config import RecognitionConfig
@@ -81,12 +81,8 @@ class _Recognition:
                 self._bus.publish(key, message)
             case WithdrawStates(states=states):
                 self._bus.withdraw(*states)
-            case AnswerRequest(answer=Accepted(id=id, within=within)):
-                self.desk.accept(id, within)
-            case AnswerRequest(answer=Refused(id=id, fault=fault)):
-                self.desk.refuse(id, fault)
-            case AnswerRequest(answer=outcome):
-                self.desk.end(outcome)
+            case AnswerRequest(answer=answer):
+                self.desk.answer(answer)
             case TellMistake(error=error, what=what, request=request):
                 fault = self._bus.failed(error, what)
                 if request and self.desk.is_live(request):

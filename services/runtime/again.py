@@ -1,7 +1,7 @@
 """A service once more, from the ledger of what it took: the same outputs, or those that other settings give. Pure.
 
     clock = StepClock(first.at.clock)
-    life = Again(Intake("robot", config, clock, first.session), clock, Content)
+    life = Again(ServiceIntake("robot", config, clock, first.session), clock, Content)
     for taken in ledger: life.take(taken, find)         # each `Taken` of this life, in order
     life.outputs, life.differences, life.lack
 
@@ -17,7 +17,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.ledger import Step, Taken
 from engage_hri.services.bus.samples import Received
-from engage_hri.services.runtime.intake import Input, Intake
+from engage_hri.services.runtime.intake import Input, ServiceIntake
 from engage_hri.services.runtime.ledger import StepClock, fingerprint
 
 Find = Callable[[str, int], Received | None]
@@ -57,7 +57,7 @@ class Again:
     lack: what is missing so far.
     """
 
-    def __init__(self, intake: Intake, clock: StepClock, content: Any, lack: Lack = Lack()) -> None:  # noqa: B008
+    def __init__(self, intake: ServiceIntake, clock: StepClock, content: Any, lack: Lack = Lack()) -> None:  # noqa: B008
         """content: type of what the intake takes, a union. lack: what is missing before the first step."""
         self.lack = lack
         self.steps = 0

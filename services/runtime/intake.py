@@ -74,7 +74,7 @@ class MachineClocks(Protocol):
         ...
 
 
-class Intake(Protocol):
+class ServiceIntake(Protocol):
     """The part of a service that decides. What follows from an input is a sequence of values, in order."""
 
     @property
@@ -85,5 +85,5 @@ class Intake(Protocol):
     def take(self, input: Input[Any], now: Seconds, /) -> Sequence[Struct]: ...
 
     def advance(self, now: Seconds, /) -> Sequence[Struct]:
-        """Do what is due by now."""
+        """Carry out what is due by now."""
         ...

@@ -13,7 +13,7 @@ from engage_hri.schemas.recognition import session_of
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.runtime.alarm import Alarm
-from engage_hri.services.runtime.intake import Input, Intake
+from engage_hri.services.runtime.intake import Input, ServiceIntake
 from engage_hri.services.runtime.ledger import Ledger, StepClock, step_of
 
 
@@ -52,7 +52,7 @@ class NotedIntake:
     """The intake of a service, with a ledger. carry_out: called with each output, in order."""
 
     def __init__(
-        self, bus: Bus, service: str, intake: Intake, clock: BusClock, carry_out: Callable[[Struct], None]
+        self, bus: Bus, service: str, intake: ServiceIntake, clock: BusClock, carry_out: Callable[[Struct], None]
     ) -> None:
         """clock: the one that the intake reads."""
         self._bus = bus
@@ -80,7 +80,7 @@ class NotedIntake:
         self.take(Input("", content, "", self._bus.now()))
 
     def advance(self) -> None:
-        """Do what is due by now."""
+        """Carry out what is due by now."""
         now, due = self._bus.now(), self._intake.deadline
         if due is not None and due <= now:
             self._clock.begin()

@@ -7,7 +7,6 @@ from functools import partial
 from typing import Any
 
 import pytest
-from engage_hri.services.commandline.study.tangram import play_tangram
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
@@ -24,6 +23,7 @@ from engage_hri.services.client.language_models import perform_call
 from engage_hri.services.client.people.perceive import perceive
 from engage_hri.services.client.people.perceived_person import PerceivedPerson
 from engage_hri.services.client.robot import Robot
+from engage_hri.services.commandline.embedding import play_tangram
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import Config, load
 from engage_hri.services.console.follow import following

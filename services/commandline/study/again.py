@@ -22,7 +22,7 @@ from engage_hri.services.bus.samples import Received
 from engage_hri.services.commandline.shell.process import DONE
 from engage_hri.services.commandline.shell.recording_file import opened
 from engage_hri.services.commandline.shell.settings import RobotConfig
-from engage_hri.services.commandline.study.realizer_again import OtherWords, Said, compared, played
+from engage_hri.services.commandline.study.realizer_again import OtherWords, SentMessage, compared, played
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.serving.intake import ControlIntake
 from engage_hri.services.control.serving.steps import ControlStep
@@ -35,7 +35,7 @@ from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.settings import flat, settings_of
 from engage_hri.services.runtime.again import Again, Find, Lack, StepDifference
 from engage_hri.services.runtime.configuration import read
-from engage_hri.services.runtime.intake import Intake, PublishMessage
+from engage_hri.services.runtime.intake import PublishMessage, ServiceIntake
 from engage_hri.services.runtime.ledger import StepClock
 
 DIFFERENT = 1
@@ -51,7 +51,7 @@ class PlayedService(NamedTuple):
     """
 
     config: type[Struct]
-    make: Callable[[str, Any, StepClock, str], Intake]
+    make: Callable[[str, Any, StepClock, str], ServiceIntake]
     content: Any
 
 
@@ -186,13 +186,13 @@ def _realizer(
     )  # fmt: skip
 
 
-def _said(recording: Recording, session: str) -> Iterable[Said]:
+def _said(recording: Recording, session: str) -> Iterable[SentMessage]:
     """What a life published, as the recording has it."""
     for place in range(len(recording)):
         if session_of(recording.life(place)) == session:
             received = recording.received(place)
             if received is not None:
-                yield Said(received.key, received.message, received.at)
+                yield SentMessage(received.key, received.message, received.at)
 
 
 def _begun(robot: str, first: Taken, had: Struct | None, settings: Sequence[str]) -> Again:

@@ -45,7 +45,7 @@ AFTER: Seconds = 0.01
 """Time for which it runs on after its last input."""
 
 
-class Said(Struct, frozen=True):
+class SentMessage(Struct, frozen=True):
     """A message that the realizer published. at: on its clock, or that of the recording."""
 
     key: str
@@ -56,8 +56,8 @@ class Said(Struct, frozen=True):
 class OtherWords(Struct, frozen=True):
     """A message that only one side has, or that says something else. None: that side has none."""
 
-    live: Said | None
-    again: Said | None
+    live: SentMessage | None
+    again: SentMessage | None
 
 
 class PlayedBus(Bus):
@@ -65,7 +65,7 @@ class PlayedBus(Bus):
 
     def __init__(self, robot: str, name: str, run: str, clock: StepClock, lives: Iterator[int]) -> None:
         super().__init__(robot, name, "", clock.name, run, lives)
-        self.said: list[Said] = []
+        self.said: list[SentMessage] = []
         self._known = clock
         self._asked = Counter[str]()
         self._answers: dict[tuple[str, int], asyncio.Future[BodyAnswered]] = {}
@@ -97,7 +97,7 @@ class PlayedBus(Bus):
 
     def _send(self, key: str, message: Message) -> None:
         in_form(key, message, "msgpack")  # as on a wire: what has no form raises
-        self.said.append(Said(key, message, self.now()))
+        self.said.append(SentMessage(key, message, self.now()))
 
     def local(self, stamp: Stamp) -> Seconds:
         return self._known.local(stamp, self.now())
@@ -165,13 +165,13 @@ async def _play(bus: PlayedBus, steps: Sequence[Step], clock: StepClock, find: F
 
 def played(
     robot: str, run: str, steps: Sequence[Step], clock: StepClock, find: Find, config: RealizerConfig
-) -> tuple[list[Said], int]:
+) -> tuple[list[SentMessage], int]:
     """What the realizer says once more, and how many messages it took are missing in the recording.
 
     run: its life. steps: all of that life, from the first on.
     """
 
-    async def play() -> tuple[list[Said], int]:
+    async def play() -> tuple[list[SentMessage], int]:
         bus = PlayedBus(robot, "realizer", run, clock, iter(range(1, 1 << 30)))
         missing = await _play(bus, steps, clock, find, config)
         return bus.said, missing
@@ -182,7 +182,9 @@ def played(
 # -- comparison -------------------------------------------------------------------------------------------------
 
 
-def compared(live: Iterable[Said], again: Iterable[Said], until: Seconds) -> tuple[list[OtherWords], Seconds]:
+def compared(
+    live: Iterable[SentMessage], again: Iterable[SentMessage], until: Seconds
+) -> tuple[list[OtherWords], Seconds]:
     """Messages that differ, in order, and the greatest difference of times of the others.
 
     until: instant from which on nothing counts: the recording may have ended in between.
@@ -199,13 +201,13 @@ def compared(live: Iterable[Said], again: Iterable[Said], until: Seconds) -> tup
     return differ, furthest
 
 
-def _named(said: Iterable[Said]) -> Mapping[tuple[object, ...], Said]:
+def _named(said: Iterable[SentMessage]) -> Mapping[tuple[object, ...], SentMessage]:
     """Messages by what they are about, and how often that was told before.
 
     Left out is what comes with the clock: renewals, predictions, and another pace for a behavior that may go on as
     far as before.
     """
-    told, named = Counter[tuple[object, ...]](), dict[tuple[object, ...], Said]()
+    told, named = Counter[tuple[object, ...]](), dict[tuple[object, ...], SentMessage]()
     for each in said:
         message = each.message
         if isinstance(message, KeepAlive | PredictionFeedback) or keys.key_class(each.key) not in ("evt", "cmd"):
