@@ -11,12 +11,10 @@ from engage_hri.services.runtime.ledger import fingerprint
 class BodyAnswered(Struct, frozen=True, kw_only=True, tag="body_answered", omit_defaults=True):
     """The body answered a question for estimates.
 
-    asked: fingerprint of the behaviors. number: of the question among those about these behaviors, from 1.
-    refused: fault with which it was answered, in place of estimates.
+    asked: fingerprint of the behaviors. refused: fault with which it was answered, in place of estimates.
     """
 
     asked: str
-    number: int
     answer: Estimates | None = None
     refused: Fault | None = None
 

@@ -187,7 +187,7 @@ def _realizer(
 
 
 def _said(recording: Recording, session: str) -> Iterable[SentMessage]:
-    """What a life published, as the recording has it."""
+    """Messages that a life published, as the recording has them."""
     for place in range(len(recording)):
         if session_of(recording.life(place)) == session:
             received = recording.received(place)

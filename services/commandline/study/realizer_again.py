@@ -9,7 +9,7 @@ between, and a command that is void at once may have been sent or not.
 """
 
 import asyncio
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from math import inf
@@ -67,28 +67,33 @@ class PlayedBus(Bus):
         super().__init__(robot, name, "", clock.name, run, lives)
         self.said: list[SentMessage] = []
         self._known = clock
-        self._asked = Counter[str]()
-        self._answers: dict[tuple[str, int], asyncio.Future[BodyAnswered]] = {}
+        self._asked = defaultdict[str, list[asyncio.Future[BodyAnswered]]](list)
+        """Questions without an answer, and answers without a question, by what they are about, in order."""
 
     def give(self, received: Received) -> None:
-        """Have it receive a message."""
+        """Hand it a message."""
         for reader in self._readers:
             if isinstance(reader, Subscription) and reader.wants(received.key):
                 reader.offer(received)
 
     def give_answer(self, answered: BodyAnswered) -> None:
-        """Have a question of it answered, now or when it is asked."""
-        self._answer(answered.asked, answered.number).set_result(answered)
+        """Answer a question of it, or the one that it asks next."""
+        open_ones = [each for each in self._asked[answered.asked] if not each.done()]
+        (open_ones[0] if open_ones else self._asking(answered.asked)).set_result(answered)
 
-    def _answer(self, asked: str, number: int) -> "asyncio.Future[BodyAnswered]":
-        return self._answers.setdefault((asked, number), asyncio.get_running_loop().create_future())
+    def _asking(self, asked: str) -> "asyncio.Future[BodyAnswered]":
+        self._asked[asked].append(future := asyncio.get_running_loop().create_future())
+        return future
 
     async def _query(self, key: str, message: Message, deadline: Seconds) -> Message | None:
         assert isinstance(message, EstimateBehaviors)
         name = behaviors_asked(message)
-        self._asked[name] += 1
-        answer = self._answer(name, self._asked[name])
-        await asyncio.wait([answer], timeout=deadline - self.now())
+        answered = [each for each in self._asked[name] if each.done()]
+        answer = answered[0] if answered else self._asking(name)
+        try:
+            await asyncio.wait([answer], timeout=deadline - self.now())
+        finally:
+            self._asked[name].remove(answer)
         if not answer.done():
             return None
         if (refused := answer.result().refused) is not None:
@@ -166,7 +171,7 @@ async def _play(bus: PlayedBus, steps: Sequence[Step], clock: StepClock, find: F
 def played(
     robot: str, run: str, steps: Sequence[Step], clock: StepClock, find: Find, config: RealizerConfig
 ) -> tuple[list[SentMessage], int]:
-    """What the realizer says once more, and how many messages it took are missing in the recording.
+    """Messages that the realizer publishes once more, and the number of those missing that it took.
 
     run: its life. steps: all of that life, from the first on.
     """

@@ -1,7 +1,6 @@
 """Planning of a block on the bus: the body is asked what its behaviors take, and asked again about the plan."""
 
 import asyncio
-from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping
 
 from msgspec.structs import replace
@@ -52,7 +51,6 @@ class Planning:
         """note: called with each answer of the body."""
         self._bus = bus
         self._note = note
-        self._asked = Counter[str]()
         self._live_blocks = live_blocks
         self._performing = performing
 
@@ -169,21 +167,20 @@ class Planning:
         if not question.items:
             return ()
         name = behaviors_asked(question)
-        number = self._asked[name] = self._asked[name] + 1
         try:
             answer = await self._bus.query(keys.ESTIMATE, question, timeout=ESTIMATE)
         except NoReply as error:
             unable = error.fault.following("no body performs it", block.id)
             raise BlockRefused(unable, "CANNOT_CREATE_BEHAVIOR") from error
         except EngageError as error:
-            self._note(BodyAnswered(asked=name, number=number, refused=error.fault))
+            self._note(BodyAnswered(asked=name, refused=error.fault))
             raise BlockRefused(error.fault, "CANNOT_CREATE_BEHAVIOR") from error
         if not isinstance(answer, Estimates):
             fault = Fault(
                 reason=f"control answered with a {type(answer).__name__}, not with estimates", where=block.id
             )
             raise BlockRefused(fault, "CANNOT_CREATE_BEHAVIOR")
-        self._note(BodyAnswered(asked=name, number=number, answer=answer))
+        self._note(BodyAnswered(asked=name, answer=answer))
         asked = {item.behavior.id for item in question.items}
         return tuple([each for each in answer.items if each.behavior in asked])  # bodies err
 
