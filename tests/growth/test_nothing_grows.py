@@ -57,7 +57,8 @@ async def growth(folder: Path, steps: int, quiet: Seconds = 0.0, *, windows: boo
                 await asyncio.sleep(quiet)
             await asyncio.sleep(REST)
             found.append(sizes({**running(), **modules()}, LIMITS))
-    return grown(found[0], found[1], slack=STEPS // 2)
+    # The bytes of a message are its own: how many messages are kept counts, not how large the last ones were.
+    return [one for one in grown(found[0], found[1], slack=STEPS // 2) if not one.path.endswith(".payload")]
 
 
 async def test_a_robot_and_its_clients_keep_nothing_of_those_who_have_gone(tmp_path: Path) -> None:
