@@ -28,7 +28,7 @@ from engage_hri.schemas.behaviors import Wait
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.zenoh.session import open_client
-from engage_hri.services.client.connection import connect
+from engage_hri.services.client.robot import connect
 from engage_hri.services.commandline.shell.process import run
 
 ROBOT = "visited"

@@ -44,13 +44,13 @@ if TYPE_CHECKING:
     from engage_hri.schemas.tool import tool_definition as tool_definition
     from engage_hri.schemas.world import Entity as Entity
     from engage_hri.schemas.world import World as World
-    from engage_hri.services.client.connection import connect as connect
     from engage_hri.services.client.language_models import perform_call as perform_call
     from engage_hri.services.client.language_models import stream as stream
     from engage_hri.services.client.people.perceive import perceive as perceive
     from engage_hri.services.client.people.perceived_person import PerceivedPerson as PerceivedPerson
     from engage_hri.services.client.results import PerformFailed as PerformFailed
     from engage_hri.services.client.robot import Robot as Robot
+    from engage_hri.services.client.robot import connect as connect
     from engage_hri.services.commandline.embedding import embedded as embedded
     from engage_hri.services.control.bases.one_part_motion import OrdinaryBody as OrdinaryBody
     from engage_hri.services.control.bases.setpoints import SetPointBody as SetPointBody
@@ -75,8 +75,7 @@ _PLACES = {
     "engage_hri.services.client.people.perceive": ("perceive",),
     "engage_hri.services.client.people.perceived_person": ("PerceivedPerson",),
     "engage_hri.services.client.results": ("PerformFailed",),
-    "engage_hri.services.client.connection": ("connect",),
-    "engage_hri.services.client.robot": ("Robot",),
+    "engage_hri.services.client.robot": ("Robot", "connect"),
     "engage_hri.services.commandline.embedding": ("embedded",),
     "engage_hri.services.control.contract.body": (
         "Arrived",

@@ -13,9 +13,8 @@ from contextlib import asynccontextmanager
 from engage_hri.schemas.behaviors import Gaze, Speech, Wait
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.connection import connect
 from engage_hri.services.client.language_models import stream
-from engage_hri.services.client.robot import Robot
+from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.runtime.service import running

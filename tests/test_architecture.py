@@ -63,7 +63,7 @@ LAYERS = {
     "services/control": "mujoco > reachy_mini service testing torso > bases calibrating serving > figure voice"
     " > contract > config motion",
     "services/commandline": "look robot study talk > app bodies embedding > shell",
-    "services/client": "language_models connection > robot > feeds people > chunking event_stream hearing inputs"
+    "services/client": "language_models > robot > orders > feeds people > chunking event_stream hearing inputs"
     " results",
     "services/generation": "service > intake > fragments > performance > body_link choosing_again ways > exchange"
     " fragment_check > acts lost pipeline > block head names > references turns > permits > config",

@@ -11,7 +11,7 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.connection import connect
+from engage_hri.services.client.robot import connect
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.generation import fragments

@@ -16,8 +16,7 @@ from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnF
 from engage_hri.schemas.messages import encode_json
 from engage_hri.schemas.requests import Refused, Request
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.connection import connect
-from engage_hri.services.client.robot import Robot
+from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.requests.ends import Requester

@@ -72,7 +72,7 @@ def test_programs_find_ours_beside_packages_of_the_same_name(installed: Path, tm
     ours, theirs, module = ended.stdout.split()
     assert ours == str(installed / "engage_hri/__init__.py")
     assert theirs == str(tmp_path / "services/__init__.py")
-    assert module.startswith("engage_hri.services.client.connection")
+    assert module.startswith("engage_hri.services.client.robot")
 
 
 def test_a_robot_runs_from_it(installed: Path, tmp_path: Path) -> None:

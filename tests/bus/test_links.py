@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from engage_hri.services.bus.zenoh.links import SETTLE, Router, RouterNews
-from engage_hri.services.client.connection import connect
+from engage_hri.services.client.robot import connect
 from tests.bus.places import free_endpoint
 from tests.cli.command import start
 from tests.cli.test_processes import PATIENCE, line, stopped

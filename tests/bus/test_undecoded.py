@@ -16,7 +16,7 @@ from engage_hri.schemas.messages import Message, published
 from engage_hri.schemas.status import AskStatus
 from engage_hri.services.bus.interface import Received, Sample
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.connection import connect
+from engage_hri.services.client.robot import connect
 from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.commandline.shell.roster import service
 from engage_hri.services.commandline.shell.sources import still

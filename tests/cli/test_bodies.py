@@ -8,7 +8,7 @@ import pytest
 
 from engage_hri.schemas.behaviors import Gaze, Speech
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.services.client.connection import connect
+from engage_hri.services.client.robot import connect
 from tests.bus.places import free_endpoint
 from tests.cli.command import Engage, start
 from tests.control.test_docs import CODE

@@ -9,8 +9,8 @@ import pytest
 
 from engage_hri.services.bus.zenoh.hub import ZenohHub
 from engage_hri.services.bus.zenoh.session import open_session
-from engage_hri.services.client.connection import connect
 from engage_hri.services.client.feeds import EventFeed
+from engage_hri.services.client.robot import connect
 from tests.bus.cable import Cable
 from tests.bus.places import free_endpoint
 from tests.cli.test_processes import PATIENCE, line, stopped

@@ -15,7 +15,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.zenoh.hub import open_hub
-from engage_hri.services.client.connection import connect
+from engage_hri.services.client.robot import connect
 from engage_hri.services.commandline.shell.sources import Thing
 from engage_hri.services.commandline.talk.play import world_with_people
 from engage_hri.services.runtime.service import running

@@ -10,7 +10,7 @@ import pytest
 
 from engage_hri.schemas.behaviors import Gesture
 from engage_hri.services.bus.zenoh.hub import open_hub
-from engage_hri.services.client.connection import connect
+from engage_hri.services.client.robot import connect
 from engage_hri.services.commandline.bodies import fault
 from engage_hri.services.commandline.shell.process import UNREADY
 from engage_hri.services.commandline.talk import play, steer

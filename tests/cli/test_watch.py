@@ -20,9 +20,8 @@ from engage_hri.schemas.nets import Fired, NetMarked, NetPlace, NetPlanned, NetP
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.zenoh.hub import open_hub
-from engage_hri.services.client.connection import connect
 from engage_hri.services.client.feeds import EventFeed
-from engage_hri.services.client.robot import Robot
+from engage_hri.services.client.robot import Robot, connect
 from tests.bus.places import free_endpoint
 from tests.cli.command import engage, start
 from tests.cli.test_processes import PATIENCE, line, stopped

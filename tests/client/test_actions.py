@@ -5,9 +5,9 @@ import asyncio
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.connection import connect
 from engage_hri.services.client.feeds import Feed
 from engage_hri.services.client.people.perceived_person import PerceivedPerson
+from engage_hri.services.client.robot import connect
 from engage_hri.services.reports.action_reports import REPORT_GRACE
 
 Event = ActionBegan | ActionEnded | ActorFound | ActorLost

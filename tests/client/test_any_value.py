@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 from engage_hri.schemas.faults import EngageError, InputRefused
 from engage_hri.schemas.summary import Summary
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.connection import connect
 from engage_hri.services.client.inputs import block_in, call_in, fragment_in
 from engage_hri.services.client.language_models import perform_call, stream
-from engage_hri.services.client.robot import Robot
+from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.control.testing.plugin import virtual_loop
 from tests.random_cases import share_of
 

@@ -11,8 +11,8 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.summary import summary
 from engage_hri.schemas.world import Entity
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.connection import connect
 from engage_hri.services.client.language_models import stream
+from engage_hri.services.client.robot import connect
 from tests.cancelling import whole_robot
 
 PLACE = (0.5, 0.0, 0.8)

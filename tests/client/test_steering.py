@@ -7,7 +7,7 @@ from engage_hri.schemas.blocks import PerformanceSteered, SteerPerformance, Stee
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.connection import connect
+from engage_hri.services.client.robot import connect
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.service import Ready, running
 

@@ -17,8 +17,8 @@ from engage_hri.schemas.summary import summary
 from engage_hri.schemas.tool import ToolInput
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.connection import connect
 from engage_hri.services.client.language_models import perform_call, stream
+from engage_hri.services.client.robot import connect
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.service import Ready, running
 

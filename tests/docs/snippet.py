@@ -13,7 +13,7 @@ from pathlib import Path
 from types import CodeType, SimpleNamespace
 from typing import Any
 
-from engage_hri.services.client.connection import connect
+from engage_hri.services.client.robot import connect
 
 CALL = {"turn_status": "full", "parts": [{"say": "Do you see"}, {"refer": "blue-square"}]}
 

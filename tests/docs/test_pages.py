@@ -75,7 +75,7 @@ the beginning is enough."""
 TALK = """\
 from contextlib import suppress
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.client.connection import connect
+from engage_hri.services.client.robot import connect
 
 async with connect() as robot:
     await robot.person()

@@ -16,7 +16,7 @@ from msgspec import Struct
 import engage_hri
 from engage_hri.schemas import faults
 from engage_hri.schemas.faults import EngageError
-from engage_hri.services.client import feeds, inputs, results, robot
+from engage_hri.services.client import feeds, inputs, orders, results, robot
 from engage_hri.services.control.contract import body
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
@@ -28,7 +28,7 @@ UNIT = re.compile(r"\b(seconds|metres|meters|radians|degrees|m/s|loop times?|how
 """What says of a bare number what it counts or measures; so does a range, such as 0..1."""
 RANGE = re.compile(r"\d\.\.\d|[([]\d, \d[)\]]|>= 0|from 1")
 RAISED = re.compile(r"^    (\w+): ", re.MULTILINE)
-CALLS_INTO = (robot, inputs, results, body)
+CALLS_INTO = (robot, orders, inputs, results, body)
 """Files whose functions the public ones call."""
 
 
@@ -199,12 +199,13 @@ def _takes_all(handler: ast.ExceptHandler) -> bool:
 
 @cache
 def _found(called: str, owner: str) -> Function | None:
-    """`self._ask` in the class, `checked` in any of the files."""
+    """`self._ask` in the class or a base of it, `checked` in any of the files."""
+    owners = [kind.__name__ for kind in THINGS[owner].__mro__] if owner else []
     for module in CALLS_INTO:
         for node in _tree(module).body:
             if isinstance(node, Function) and node.name == called:
                 return node
-            if isinstance(node, ast.ClassDef) and node.name == owner and called.startswith("self."):
+            if isinstance(node, ast.ClassDef) and node.name in owners and called.startswith("self."):
                 for each in node.body:
                     if isinstance(each, Function) and f"self.{each.name}" == called:
                         return each

@@ -6,7 +6,7 @@ from collections.abc import AsyncGenerator
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Speech
 from engage_hri.schemas.blocks import Block
 from engage_hri.services.bus.interface import Hub
-from engage_hri.services.client.connection import connect
+from engage_hri.services.client.robot import connect
 from engage_hri.services.control.contract.body import MovementAuthority, Progress, Reached
 from engage_hri.services.control.torso.body import SimulatedBody
 

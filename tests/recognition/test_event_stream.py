@@ -16,10 +16,9 @@ from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventOutcom
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.connection import connect
 from engage_hri.services.client.event_stream import EventStream
 from engage_hri.services.client.feeds import EventFeed
-from engage_hri.services.client.robot import Robot
+from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.service import running

@@ -18,11 +18,10 @@ from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.summary import summary
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.connection import connect
 from engage_hri.services.client.language_models import perform_call
 from engage_hri.services.client.people.perceive import perceive
 from engage_hri.services.client.people.perceived_person import PerceivedPerson
-from engage_hri.services.client.robot import Robot
+from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline.embedding import play_tangram
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import Config, load

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from engage_hri.schemas.documents import json_codec
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.ledger import Step
 from engage_hri.schemas.messages import Message, decode, encode, encode_json
 from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.syncref import is_id
@@ -24,6 +25,9 @@ FORMS: dict[str, Callable[[Message], bytes]] = {"application/json": encode_json,
 XML = b'<bml id="b">\n<speech id="s">caf\xc3\xa9 <sync id="m"/></speech><gaze id="g" target="cup" start="s:m"/></bml>'
 JSON = b'{"turn_status": "full",\n"parts": [{"say": "caf\xc3\xa9"}, {"refer": "cup"}]}'
 TOML = 'robot = "café"\n[realizer]\nlate = 0.5\n'.encode()
+
+st.register_type_strategy(Step, st.builds(Step, content=st.none() | st.text(max_size=9)))
+"""What a ledger holds is of types of each service."""
 
 
 @st.composite

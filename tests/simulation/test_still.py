@@ -13,7 +13,7 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.units import Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.connection import connect
+from engage_hri.services.client.robot import connect
 from engage_hri.services.runtime.service import running
 from engage_hri.services.simulation.still import EXAMPLE, load_world, show_world, table_world
 

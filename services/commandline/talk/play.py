@@ -19,9 +19,8 @@ from engage_hri.schemas.status import AskStatus
 from engage_hri.schemas.units import A_DAY, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Hub
-from engage_hri.services.client.connection import connect
 from engage_hri.services.client.language_models import summary_of
-from engage_hri.services.client.robot import Robot
+from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline.embedding import in_memory, services
 from engage_hri.services.commandline.shell.exit_codes import readable
 from engage_hri.services.commandline.shell.failing_output import complain

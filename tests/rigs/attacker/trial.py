@@ -11,8 +11,7 @@ from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.services.bus.certificates import initialize
-from engage_hri.services.client.connection import connect
-from engage_hri.services.client.robot import Robot
+from engage_hri.services.client.robot import Robot, connect
 from tests.access.fortress import Told
 from tests.bus.places import OWN_ADDRESS, free_endpoint
 from tests.rigs.attacker.attacks import NOBODY
