@@ -15,6 +15,7 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
+from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.ledger import Step, Taken
 from engage_hri.services.bus.samples import Received
 from engage_hri.services.runtime.intake import Input, ServiceIntake
@@ -48,6 +49,16 @@ class StepDifference(Struct, frozen=True):
     number: int
     step: Step
     outputs: tuple[Struct, ...]
+
+
+def content_of(step: Step, kind: Any) -> Any:
+    """Read what a step took. kind: the type that it is of, a union. Raises InputRefused: it is of no such type."""
+    try:
+        return msgspec.convert(step.content, kind)
+    except msgspec.ValidationError as error:
+        reason = f"a ledger has what this Engage does not know: {error}"
+        fault = Fault(reason=reason, where=f"step at {step.now:.3f} s", advice="use the Engage that recorded it")
+        raise InputRefused(fault) from error
 
 
 class Again:
@@ -90,7 +101,7 @@ class Again:
         self._clock.read(step.clocks)
         at = step.now if step.at is None else step.at
         if step.content is not None:
-            content = msgspec.convert(step.content, self._content)
+            content = content_of(step, self._content)
             return self._intake.take(Input(step.key, content, step.source, at, step.past, step.life), step.now)
         if not step.number:
             return self._intake.advance(step.now)

@@ -11,7 +11,8 @@ from msgspec.structs import replace
 from engage_hri.schemas import keys
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.behaviors import Event
-from engage_hri.schemas.ledger import Taken
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.ledger import Step, Taken
 from engage_hri.schemas.recognition import RequestEvent
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
@@ -20,10 +21,12 @@ from engage_hri.services.client.people.perceived_actions import PerceivedActions
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.study.again import again
 from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.intake import Content
 from engage_hri.services.recognition.service import recognize
 from engage_hri.services.recording.disk import read
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.requests.ends import Requester
+from engage_hri.services.runtime.again import content_of
 from engage_hri.services.runtime.service import serve
 from engage_hri.services.tangram.people.config import SimulationConfig
 from tests.recording.runs import recording_to, tangram
@@ -236,3 +239,11 @@ async def test_a_step_that_took_something_else_is_noticed_and_named(tmp_path: Pa
     first = life.differences[0].step
     assert life.lack.is_nothing
     assert (first.life, first.number) in changed
+
+
+@pytest.mark.parametrize("content", [{"type": "nothing_we_know"}, "text", 7, [1]])
+def test_a_step_that_took_what_nobody_knows_is_refused_in_words(content: object) -> None:
+    step = Step(now=1.5, key=keys.WORLD, content=content)
+
+    with pytest.raises(InputRefused, match=r"step at 1\.500 s.*does not know"):
+        content_of(step, Content)

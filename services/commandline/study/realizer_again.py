@@ -33,7 +33,7 @@ from engage_hri.services.bus.samples import Received
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.inputs import BodyAnswered, RealizerInput, behaviors_asked
 from engage_hri.services.realizer.service import realize
-from engage_hri.services.runtime.again import Find
+from engage_hri.services.runtime.again import Find, content_of
 from engage_hri.services.runtime.ledger import StepClock
 from engage_hri.services.runtime.virtual_time import run_virtual
 
@@ -151,7 +151,7 @@ async def _play(bus: PlayedBus, steps: Sequence[Step], clock: StepClock, find: F
             await due
         if step.content is None:
             found = find(step.life, step.number)
-        elif isinstance(content := msgspec.convert(step.content, RealizerInput), BodyAnswered):
+        elif isinstance(content := content_of(step, RealizerInput), BodyAnswered):
             bus.give_answer(content)
             found = None
         else:
