@@ -156,7 +156,9 @@ class _Generation:
                 case AnswerRequest(answer=answer):
                     self._desk.answer(answer)
                 case SendRequest(key=key, request=PerformBlock(id=id) as block):
-                    self._requests.send(key, block, tell=partial(self._has_come, id))
+                    # A block that a bug of ours keeps from being sent has ended, or its fragment would wait for ever.
+                    with self._bus.containing(block, lambda fault: self._has_come(id, RunFailed(fault))):
+                        self._requests.send(key, block, tell=partial(self._has_come, id))
                 case SendRequest(key=key, request=request):
                     self._requests.send(key, request)
                 case CancelRequest(id=id, why=why):

@@ -70,7 +70,7 @@ async def test_a_recording_that_was_removed_with_its_folder_is_not_said_to_be_th
     path.parent.mkdir()
     async with recorder_of(path) as (_, recorder):
         shutil.rmtree(path.parent)
-        await line(recorder, "a.mcap: removed while it is recorded, and not written anew: No such file or directory")
+        await line(recorder, "a.mcap: removed while it is recorded, and lost with the end of its recorder")
         code, said = await ended(recorder)
 
     assert code == 3

@@ -85,9 +85,11 @@ def tap(record: Record) -> None:
         record.message(key, message)
         publish(hub, bus, key, message)
 
-    def sending(requester: Requester, key: str, request: Any, within: float | None = None) -> Pending:
+    def sending(
+        requester: Requester, key: str, request: Any, within: float | None = None, tell: Any = None
+    ) -> Pending:
         is_new = request.id not in requester._pending
-        pending = send(requester, key, request, within)
+        pending = send(requester, key, request, within, tell)
         if is_new:
             whose = f"{requester._bus.name}|{requester._life}|{request.__struct_config__.tag}|{request.id}"
             record("asked", whose=whose)
