@@ -35,8 +35,7 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.keyring import Keys, read_keys
 from engage_hri.services.bus.zenoh.hub import open_hub
-from engage_hri.services.client.robot import connect
-from engage_hri.services.client.robot import Robot
+from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline.shell.process import run
 
 ROBOT = "robot"
