@@ -4,7 +4,7 @@
 microseconds each. What is worked on must not change meanwhile. `finished` does it all in one go.
 """
 
-from collections.abc import Callable, Collection, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator
 from typing import ParamSpec, TypeVar
 
 T = TypeVar("T")
@@ -15,8 +15,6 @@ Steps = Generator[int, None, T]
 
 SLICE = 512
 """Elements that are worked on in one go: one to five milliseconds. Counted: equal runs stay equal."""
-PORTION = 64
-"""Number of a block's elements that are looked at between two pauses."""
 
 
 def finished(steps: Steps[T]) -> T:
@@ -32,9 +30,3 @@ def finished(steps: Steps[T]) -> T:
 def in_one_go(work: Callable[P, Steps[T]]) -> Callable[P, T]:
     """The same work as a plain function."""
     return lambda *args, **rest: finished(work(*args, **rest))
-
-
-def portions(elements: Collection[T], size: int = PORTION) -> Iterator[Sequence[T]]:
-    """The elements in order, in lists of at most `size`."""
-    listed = elements if isinstance(elements, list | tuple) else tuple(elements)
-    return (listed[since : since + size] for since in range(0, len(listed), size))

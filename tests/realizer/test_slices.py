@@ -17,9 +17,10 @@ from engage_hri.schemas.body import SyncPointReached
 from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.services.realizer.plan.known import Known
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.planner import Tries, plan_block, plan_tries
+from engage_hri.services.realizer.plan.planner import plan_block, plan_tries
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.together.planning import MOST_BEHAVIORS
+from engage_hri.services.runtime.steps import Steps
 from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.oracle import estimate, possible_blocks, random_blocks
@@ -49,7 +50,7 @@ def large(shape: Callable[[int], Parts], size: int = MOST_BEHAVIORS, id: str = "
     return Block(id=id, behaviors=tuple(behaviors), constraints=(Constraint(operators=tuple(operators)),))
 
 
-def tries(steps: Tries[Plan]) -> tuple[list[int], Plan]:
+def tries(steps: Steps[Plan]) -> tuple[list[int], Plan]:
     """Functions called in each try, as the event loop would see it; and the plan."""
     calls = [0]
 
@@ -68,7 +69,7 @@ def tries(steps: Tries[Plan]) -> tuple[list[int], Plan]:
         sys.setprofile(before)
 
 
-def tried(steps: Tries[Plan]) -> Plan | str:
+def tried(steps: Steps[Plan]) -> Plan | str:
     try:
         return tries(steps)[1]
     except BlockRefused as error:

@@ -7,9 +7,8 @@ between equals; any other permutation of a block gives the same net.
 A block that is being performed is planned again when something was dropped, others came, or motions take longer.
 """
 
-from collections.abc import Collection, Container, Generator, Iterable, Mapping
+from collections.abc import Collection, Container, Iterable, Mapping
 from functools import partial
-from typing import TypeVar
 
 from msgspec.structs import replace
 
@@ -53,34 +52,7 @@ from engage_hri.services.realizer.plan.schedule import Impossible, Solution, cri
 from engage_hri.services.realizer.plan.speaking_order import Misordered, SpeakingOrder, may_speak_at_once
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import Point, frozen
-
-T = TypeVar("T")
-Tries = Generator[None, None, T]
-"""Work that makes nets until one of them will do, and pauses before each but the first."""
-
-
-def plan_block(
-    block: Block,
-    estimates: Iterable[Estimate] = (),
-    *,
-    dropped: Iterable[str] = (),
-    known: Known = NOTHING,
-    barred: Container[tuple[str, Hand]] = (),
-    turns: frozenset[Turn] = frozenset(),
-    manner: Manner = AT_EASE,
-) -> Plan:
-    """Plan `block`; durations that no estimate gives are nominal. Raises BlockRefused, with place and line.
-
-    dropped: behaviors to leave out as if never written. known: other live blocks. barred: hands with which a behavior
-    cannot be done. turns: those to begin with. manner: see there.
-    """
-    tries = plan_tries(block, estimates, dropped=dropped, known=known, barred=barred, turns=turns, manner=manner)
-    while True:
-        try:
-            next(tries)
-        except StopIteration as end:
-            plan: Plan = end.value
-            return plan
+from engage_hri.services.runtime.steps import SLICE, Steps, in_one_go
 
 
 def plan_tries(
@@ -92,16 +64,24 @@ def plan_tries(
     barred: Container[tuple[str, Hand]] = (),
     turns: frozenset[Turn] = frozenset(),
     manner: Manner = AT_EASE,
-) -> Tries[Plan]:
-    """Plan as `plan_block` does, with a pause before each net but the first. What is given must not change meanwhile.
+) -> Steps[Plan]:
+    """Plan `block`; durations that no estimate gives are nominal. Raises BlockRefused, with place and line.
 
-    A block that a person wrote is settled with the first net. Others need as many as they have behaviors, and who
-    performs something else meanwhile gets its turn at the pauses.
+    There is a pause before each net but the first, however long that took. A block that a person wrote is settled
+    with the first net. Others need as many as they have behaviors, and who performs something else meanwhile gets its
+    turn at the pauses.
+
+    dropped: behaviors to leave out as if never written. known: other live blocks. barred: hands with which a behavior
+    cannot be done. turns: those to begin with. manner: see there.
     """
     planner = _Planner(block, {each.behavior: each for each in estimates}, dropped, barred, known, manner)
     planner.parts = PartOrder(turns)
     planner.read()
     return (yield from planner.plan())
+
+
+plan_block = in_one_go(plan_tries)
+"""Plan as `plan_tries` does, without a pause."""
 
 
 class _Planner:
@@ -192,7 +172,7 @@ class _Planner:
             if needed in self.depending:
                 self.depending[id] = fallen, self.depending[needed][1], self.problems[-1]
 
-    def plan(self) -> Tries[Plan]:
+    def plan(self) -> Steps[Plan]:
         """The plan; behaviors that cannot be on time are dropped until the rest can be.
 
         It comes to an end: each time it is tried anew, a time of a speech is gone for good, a turn that nobody can
@@ -214,7 +194,7 @@ class _Planner:
                 waits = [loss.turn for loss in found.losses if loss.turn in self.turns]
                 if not self.parts.change(waits, self.turns, self.chains, self.known.begun):
                     self._give_up(found.losses, present)
-            yield
+            yield SLICE
 
     def _give_up(self, found: Iterable[Loss], present: Relations) -> None:
         """Give up what cannot be on time: a wait, a time of a speech, or else the behavior."""
@@ -263,7 +243,7 @@ class _Planner:
         self.problems.append(Problem("IMPOSSIBLE_TO_SCHEDULE", at_line(self.lines[id], reason), id))
         self.given_up.setdefault(id, {})[said] = self.problems[-1]
 
-    def _plan(self, present: Relations, classes: Classes) -> Tries[Plan]:
+    def _plan(self, present: Relations, classes: Classes) -> Steps[Plan]:
         """The plan of the behaviors that are left. Raises Losses: those that cannot be on time.
 
         A conflict adds a turn, or settles a hand. Between two conflicts handovers only become more, or keep more. If
@@ -316,7 +296,7 @@ class _Planner:
                 arrangement, tried = arranged_anew(turns=self.turns, spoken=arrangement.spoken), []
             else:
                 break
-            yield
+            yield SLICE
         return Plan(
             block=with_hands(self.block, self.hands),
             behaviors=tuple([chain.behavior for chain in self.chains.values()]),
@@ -353,7 +333,7 @@ class _Planner:
 
     def _solved(
         self, assembler: Assembler, arrangement: Arrangement, classes: Classes
-    ) -> Tries[tuple[Assembler, Assembly, Solution]]:
+    ) -> Steps[tuple[Assembler, Assembly, Solution]]:
         """The net and its schedule; points in a circle without delay become one instant.
 
         Raises Losses, or BlockRefused: a deadlock.
@@ -413,7 +393,7 @@ class _Planner:
                 raise judge(
                     impossible, assembly, self.chains, present, classes, self.block.id, turns, self.spelling
                 ) from None
-            yield
+            yield SLICE
             return (yield from self._solved(assembler, arrangement, classes))
 
     def _resolve(self, conflict: Conflict) -> None:

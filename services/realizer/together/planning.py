@@ -19,13 +19,14 @@ from engage_hri.services.realizer.plan.agreement import Rounds, planned_times, p
 from engage_hri.services.realizer.plan.handover import hands_refused
 from engage_hri.services.realizer.plan.known import Known, is_foreign, is_named_in
 from engage_hri.services.realizer.plan.plan import Plan
-from engage_hri.services.realizer.plan.planner import Tries, plan_tries
+from engage_hri.services.realizer.plan.planner import plan_tries
 from engage_hri.services.realizer.plan.relations import BlockRefused, extent, relations_of
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.realizer.together.knowledge import Asker, knowledge, may_share, parts_of
 from engage_hri.services.realizer.together.live import Live
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks, Past
 from engage_hri.services.realizer.together.rehearsal import is_crowd, meanwhile, parts_moved, question_about
+from engage_hri.services.runtime.unhurried import unhurried
 
 ESTIMATE: Seconds = 2.0
 """Time that the body may take to answer what it expects of a block; one that is planning itself needs it. Ours."""
@@ -108,7 +109,7 @@ class Planning:
                 tries = plan_tries(
                     chosen, rounds.estimates, known=known, barred=barred, turns=rounds.turns, manner=rounds.manner
                 )
-                plan = await _in_turns(tries)
+                plan = await unhurried(tries)
             except BlockRefused:
                 if rounds.turns:
                     rounds.let_go()
@@ -189,17 +190,6 @@ async def planned_alone(bus: Bus, block: Block) -> Plan:
     """Plan a block with the body on this bus, beside no other block. Raises BlockRefused."""
     live = Live(PerformBlock(id="plan", block=block), (), Past(bus.now))
     return await Planning(bus, LiveBlocks(bus.now), list).plan(live)
-
-
-async def _in_turns(tries: Tries[Plan]) -> Plan:
-    """The plan, with a turn for whatever else is due before each net but the first."""
-    while True:
-        try:
-            next(tries)
-        except StopIteration as end:
-            plan: Plan = end.value
-            return plan
-        await asyncio.sleep(0)
 
 
 def _too_large(block: Block, reason: str) -> BlockRefused:
