@@ -39,7 +39,7 @@ from engage_hri.services.control.serving.state_publisher import Shown
 from engage_hri.services.control.serving.warnings_told import recovered, warn
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.alarm import Timer
-from engage_hri.services.runtime.intake import AnswerRequest, Input, PublishMessage
+from engage_hri.services.runtime.intake import AnswerRequest, PublishMessage, input_of
 from engage_hri.services.runtime.noted import BusClock, NotedIntake
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
@@ -150,8 +150,7 @@ class _Control:
     def take(self, received: Received) -> None:
         """Take a message."""
         if isinstance(received.message, World):
-            world = Input(received.key, received.message, received.source, received.at, received.past, received.life)
-            self._steps.take(world, received.number)
+            self._steps.take(input_of(received, received.message), received.number)
             self._timer.set(self._steps.deadline)
         elif (request := self.desk.take(received)) is not None:
             self._serve(request)

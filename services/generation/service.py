@@ -33,7 +33,7 @@ from engage_hri.services.generation.exchange import (
 from engage_hri.services.generation.intake import GenerationIntake, reads
 from engage_hri.services.requests.ends import News, RequestDesk, Requester
 from engage_hri.services.runtime.alarm import Alarm
-from engage_hri.services.runtime.intake import AnswerRequest, Input, PublishMessage, TellMistake
+from engage_hri.services.runtime.intake import AnswerRequest, Input, PublishMessage, TellMistake, input_of
 from engage_hri.services.runtime.noted import BusClock, NotedIntake
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
@@ -99,8 +99,7 @@ class _Generation:
         if request is not None:
             self._take(Input(received.key, request, received.source, received.at))
         if reads(message):
-            input = Input(received.key, message, received.source, received.at, received.past, received.life)
-            self._take(input, received.number)
+            self._take(input_of(received, message), received.number)
 
     def take_own(self, content: GenerationBegan | AnswerCame) -> None:
         self._do(partial(self._steps.take_own, content))

@@ -12,7 +12,14 @@ from engage_hri.services.bus.sight import LATE
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.intake import Intake, reads
 from engage_hri.services.requests.ends import RequestDesk
-from engage_hri.services.runtime.intake import AnswerRequest, Input, PublishMessage, TellMistake, WithdrawStates
+from engage_hri.services.runtime.intake import (
+    AnswerRequest,
+    Input,
+    PublishMessage,
+    TellMistake,
+    WithdrawStates,
+    input_of,
+)
 from engage_hri.services.runtime.noted import BusClock, NotedIntake
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
@@ -67,10 +74,7 @@ class _Recognition:
         message = request or received.message
         is_unaccepted = request is None and isinstance(message, RequestEvent | SignalTurn | Cancel)
         if reads(message) and not is_unaccepted:
-            content = Input(
-                received.key, message, received.source, received.at, received.past, received.life
-            )  # fmt: skip
-            self.steps.take(content, 0 if request is not None else received.number)
+            self.steps.take(input_of(received, message), 0 if request is not None else received.number)
 
     def _cancel(self, cancel: Cancel) -> None:
         self.steps.take(Input(keys.cancel("recognition"), cancel, "", self._bus.now()))

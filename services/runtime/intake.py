@@ -14,6 +14,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.bus.samples import Received
 
 Content = TypeVar("Content")
 
@@ -30,6 +31,11 @@ class Input(Struct, Generic[Content], frozen=True):
     at: Seconds
     past: bool = False
     life: str = ""
+
+
+def input_of(received: Received, message: Content) -> Input[Content]:
+    """Make the input of a message as it arrived. message: its content, as the service takes it."""
+    return Input(received.key, message, received.source, received.at, received.past, received.life)
 
 
 class PublishMessage(Struct, frozen=True):

@@ -13,7 +13,7 @@ from engage_hri.schemas.recognition import session_of
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.runtime.alarm import Alarm
-from engage_hri.services.runtime.intake import Input, ServiceIntake
+from engage_hri.services.runtime.intake import Input, ServiceIntake, input_of
 from engage_hri.services.runtime.ledger import Ledger, StepClock, step_of
 
 
@@ -48,6 +48,22 @@ class BusClock(StepClock):
         self._known[clock] = ReadClock(clock, zero if one - zero > 0.5 else None, error if isfinite(error) else None)
 
 
+class BusLedger(Ledger):
+    """The ledger of a service, told on its bus."""
+
+    def __init__(self, bus: Bus, service: str) -> None:
+        super().__init__(service, session_of(bus.run), bus.clock, bus.now())
+        self._bus = bus
+        self._key = keys.taken(service)
+
+    def tell(self, now: Seconds) -> None:
+        """Tell the steps so far. What a ledger cannot tell is told as a fault, and keeps nothing from being done."""
+        with self._bus.containing("the ledger"):
+            told = self.portion(now, is_heard=self._bus.is_heard(self._key))
+            if told is not None:
+                self._bus.publish(self._key, told)
+
+
 class NotedIntake:
     """The intake of a service, with a ledger. carry_out: called with each output, in order."""
 
@@ -59,8 +75,7 @@ class NotedIntake:
         self._intake = intake
         self._clock = clock
         self._carry_out = carry_out
-        self._key = keys.taken(service)
-        self._ledger = Ledger(service, session_of(bus.run), bus.clock, bus.now())
+        self._ledger = BusLedger(bus, service)
 
     @property
     def deadline(self) -> Seconds | None:
@@ -94,10 +109,7 @@ class NotedIntake:
         """Carry out what a step led to. The steps are told before: a recording has all that its events came from."""
         due = self._ledger.deadline
         if outputs or self._ledger.is_full or (due is not None and due <= now):
-            with self._bus.containing("the ledger"):  # whatever it cannot tell is carried out all the same
-                told = self._ledger.portion(now, is_heard=self._bus.is_heard(self._key))
-                if told is not None:
-                    self._bus.publish(self._key, told)
+            self._ledger.tell(now)
         for output in outputs:
             self._carry_out(output)
 
@@ -110,9 +122,8 @@ class NotedInputs:
 
     def __init__(self, bus: Bus, service: str) -> None:
         self._bus = bus
-        self._key = keys.taken(service)
         self._clock = BusClock(bus)
-        self._ledger = Ledger(service, session_of(bus.run), bus.clock, bus.now())
+        self._ledger = BusLedger(bus, service)
         self._alarm = Alarm(self._tell)
 
     def take(self, received: Received, *, is_same_turn: bool = False) -> None:
@@ -122,8 +133,7 @@ class NotedInputs:
         for stamp in (getattr(message, "at", None), getattr(message, "arrived", None)):
             if isinstance(stamp, Stamp):
                 self._clock.local(stamp, now)
-        input = Input(received.key, message, received.source, received.at, received.past, received.life)
-        self._note(replace(step_of(input, received.number, now), is_same_turn=is_same_turn))
+        self._note(replace(step_of(input_of(received, message), received.number, now), is_same_turn=is_same_turn))
 
     def take_own(self, content: Struct) -> None:
         """Note what came by no bus."""
@@ -144,7 +154,5 @@ class NotedInputs:
             self._alarm.set(self._ledger.deadline)
 
     def _tell(self) -> None:
-        told = self._ledger.portion(self._bus.now(), is_heard=self._bus.is_heard(self._key))
-        if told is not None:
-            self._bus.publish(self._key, told)
+        self._ledger.tell(self._bus.now())
         self._alarm.set(self._ledger.deadline)

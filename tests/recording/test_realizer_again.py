@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.blocks import Block, PerformBlock, SteerPerformance, SteerRobot
+from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock, SteerPerformance, SteerRobot
 from engage_hri.schemas.body import PerformBehavior, SyncPointReached
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Received
@@ -26,8 +26,11 @@ from engage_hri.services.recognition.service import recognize
 from engage_hri.services.recording.disk import read
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.requests.ends import Requester
+from engage_hri.services.runtime import ledger
 from engage_hri.services.runtime.service import running, serve
 from engage_hri.services.runtime.virtual_time import run_virtual
+from tests.realizer.fake_body import FakeBody
+from tests.realizer.stage import stage
 from tests.realizer.test_plan_growth import tied_at_random
 from tests.recording.runs import recording_to
 
@@ -148,3 +151,24 @@ def test_other_settings_make_it_do_something_else(tmp_path: Path) -> None:
 )
 def test_what_differs_in_more_than_numbers_is_infinitely_far(one: object, other: object, expected: float) -> None:
     assert distance(one, other) == expected
+
+
+@pytest.mark.contained
+async def test_a_ledger_that_cannot_be_told_keeps_no_block_from_being_performed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tried = []
+
+    def broken(outputs: object) -> str:
+        tried.append(outputs)
+        raise ZeroDivisionError("no ledger")
+
+    monkeypatch.setattr(ledger, "fingerprint", broken)
+    monkeypatch.setattr(ledger, "PORTION", 1)
+    async with stage(FakeBody()) as seen:
+        with seen.hub.join("watcher").subscribe(keys.ANY_TAKEN):
+            outcome = await seen.ask(tied_at_random(6, random.Random(1))).outcome
+
+    assert isinstance(outcome, BlockOutcome)
+    assert outcome.status == "done"
+    assert tried

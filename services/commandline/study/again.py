@@ -64,8 +64,10 @@ SERVICES = {
 }
 
 
-ALL = (*SERVICES, "realizer")
-"""Services that can be played to."""
+CONFIGS: dict[str, type[Struct]] = {
+    "realizer": RealizerConfig, **{name: service.config for name, service in SERVICES.items()}
+}  # fmt: skip
+"""Services that can be played to, and the type of the configuration of each. The realizer has no intake."""
 
 
 class Compared(Struct, frozen=True, kw_only=True):
@@ -116,7 +118,9 @@ class Compared(Struct, frozen=True, kw_only=True):
         return one == other
 
 
-def again(recording: Recording, settings: Sequence[str] = (), services: Iterable[str] = ALL) -> list[Compared]:
+def again(
+    recording: Recording, settings: Sequence[str] = (), services: Iterable[str] = tuple(CONFIGS)
+) -> list[Compared]:
     """Play it to each life of these services once more; with settings, `SERVICE.KEY=VALUE`, to those alone.
 
     The realizer runs on an event loop, so nobody may ask for it on another one.
@@ -170,9 +174,7 @@ def _realizer(
     lack = Lack(settings=had is None, before=before, gaps=gaps)
     if before:
         return Compared(service="realizer", session=first.session, steps=0, differences=(), lack=lack)
-    config = had or RealizerConfig()
-    if settings:
-        config = with_settings("realizer", config, settings)
+    config = _config("realizer", had, settings)
     assert isinstance(config, RealizerConfig)
     live = [*_said(recording, first.session)]
     run = next(
@@ -198,13 +200,18 @@ def _said(recording: Recording, session: str) -> Iterable[SentMessage]:
 def _begun(robot: str, first: Taken, had: Struct | None, settings: Sequence[str]) -> Again:
     """The life of a service that begins with these steps."""
     service = SERVICES[first.service]
-    config = had or service.config()
-    if own := [line for line in settings if line.startswith(f"{first.service}.")]:
-        config = with_settings(first.service, config, own)
+    config = _config(first.service, had, settings)
     clock = StepClock(first.at.clock)
     return Again(
         service.make(robot, config, clock, first.session), clock, service.content, Lack(settings=had is None)
     )
+
+
+def _config(service: str, had: Struct | None, settings: Sequence[str]) -> Struct:
+    """The configuration that a service had, else that by default; with those of the settings that are its own."""
+    config = had or CONFIGS[service]()
+    own = [line for line in settings if line.startswith(f"{service}.")]
+    return with_settings(service, config, own) if own else config
 
 
 def _events(outputs: Iterable[Struct]) -> Iterable[ConnectionEvent]:
@@ -218,9 +225,9 @@ def _configurations(recording: Recording) -> dict[tuple[str, str], Struct]:
     found = {}
     for life in settings_of(recording):
         name = life.told.participant
-        if name not in ALL or life.unread:
+        if name not in CONFIGS or life.unread:
             continue
-        config = RealizerConfig if name == "realizer" else SERVICES[name].config
+        config = CONFIGS[name]
         try:
             found[name, session_of(life.told.run)] = msgspec.convert(life.sections.get(name, {}), config)
         except msgspec.ValidationError as error:
@@ -259,7 +266,7 @@ def play_again(paths: Sequence[Path], settings: Sequence[str], console: Console)
     for path in paths:
         lives = again(opened(path), settings)
         if not lives:
-            reason = f"{', '.join(ALL)} told nothing of what they took: none was there, or of another Engage"
+            reason = f"{', '.join(CONFIGS)} told nothing of what they took: none was there, or of another Engage"
             raise InputRefused(Fault(reason=reason, where=str(path)))
         for life in lives:
             for line in told(life, path.name, has_other_settings=bool(settings)):
