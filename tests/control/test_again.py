@@ -16,10 +16,9 @@ from engage_hri.schemas.body import AbortBehavior, BehaviorOutcome, GoHome, Perf
 from engage_hri.schemas.body_faults import BodyFault, SwitchFaults
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.ledger import Taken
-from engage_hri.schemas.messages import Message, decode, encode
+from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Refused
 from engage_hri.schemas.world import World
-from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.config import ControlConfig, Variability
 from engage_hri.services.control.contract.body import (
@@ -39,9 +38,9 @@ from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.again import Again
 from engage_hri.services.runtime.intake import AnswerRequest
-from engage_hri.services.runtime.ledger import StepClock
 from engage_hri.services.runtime.service import running
 from tests.commanding import command
+from tests.ledgers import RecordedLives, changed_step
 
 CONFIG = ControlConfig(variability=Variability(seed=5))
 FAULTS = (
@@ -154,38 +153,11 @@ def extend(by: Requester, chance: Random, before: PerformBehavior) -> None:
     by.send(keys.BEHAVIOR, replace(before, through=through, held=chance.random() < 0.3))
 
 
-class Recorded:
-    """What control took, and the messages of the world that it took; as they travel."""
-
-    def __init__(self, hub: MemoryHub) -> None:
-        self._bus: Bus = hub.join("watcher", "observer")
-        self._inbox = self._bus.subscribe(keys.taken("control"), keys.WORLD, capacity=10**6)
-        self.lives: dict[str, list[Taken]] = {}
-        self.worlds: dict[tuple[str, int], Received] = {}
-
-    async def read(self) -> None:
-        while len(self._inbox):
-            received = await self._inbox.next()
-            assert received is not None
-            if isinstance(received.message, Taken):
-                told = decode(encode(received.message))
-                assert isinstance(told, Taken)
-                self.lives.setdefault(told.session, []).append(told)
-            else:
-                self.worlds[received.life, received.number] = received
-        self._inbox.close()
-        await self._bus.leave()
-
-    def again(self, session: str) -> Again:
-        clock = StepClock(self.lives[session][0].at.clock)
-        life = Again(ControlIntake("robot", CONFIG, clock.name), clock, ControlStep)
-        for taken in self.lives[session]:
-            life.take(taken, lambda life, number: self.worlds.get((life, number)))
-        return life
-
-
-async def recorded(hub: MemoryHub, seed: int, lives: int = 1) -> Recorded:
-    record, chance = Recorded(hub), Random(seed)
+async def recorded(hub: MemoryHub, seed: int, lives: int = 1) -> RecordedLives:
+    record = RecordedLives(
+        hub, "control", lambda clock, session: ControlIntake("robot", CONFIG, clock.name), ControlStep
+    )
+    chance = Random(seed)
     for _ in range(lives):
         await live(hub, chance, 60.0)
         await asyncio.sleep(keys.HISTORY_MAX_AGE + 0.1)
@@ -258,20 +230,11 @@ async def test_a_step_that_took_something_else_is_noticed_and_named(hub: MemoryH
     record = await recorded(hub, 2)
     [(session, ledger)] = record.lives.items()
     tag = kind.__struct_config__.tag  # type: ignore[attr-defined]
-    place, changed = next(
-        (place, number)
-        for place, taken in enumerate(ledger)
-        for number, step in enumerate(taken.steps)
-        if step.content and step.content["type"] == tag and step.led_to
-    )
-    step = ledger[place].steps[changed]
-    other = replace(step, content=step.content | {"request": "another"})
-    steps = (*ledger[place].steps[:changed], other, *ledger[place].steps[changed + 1 :])
-    ledger[place] = replace(ledger[place], steps=steps)
+    changed = changed_step(ledger, tag, request="another")
 
     first = record.again(session).differences[0]
 
-    assert first.number == ledger[place].first + changed
+    assert first.number == changed
     assert first.step.content["request"] == "another"
 
 

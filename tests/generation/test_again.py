@@ -19,11 +19,10 @@ from engage_hri.schemas.body_faults import BodyFault, SwitchFaults
 from engage_hri.schemas.conditions import SetCondition
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnFragment, TurnStatus
 from engage_hri.schemas.ledger import Taken
-from engage_hri.schemas.messages import Message, decode, encode
+from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import SignalTurn
 from engage_hri.schemas.world import World
-from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.service import embody
@@ -38,9 +37,9 @@ from engage_hri.services.recognition.service import recognize
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.again import Again
 from engage_hri.services.runtime.intake import AnswerRequest
-from engage_hri.services.runtime.ledger import StepClock
 from engage_hri.services.runtime.service import Service, running
 from tests.generation.partners import TABLE
+from tests.ledgers import RecordedLives, changed_step
 from tests.random_cases import share_of
 from tests.standing_still import stand_still
 
@@ -196,37 +195,11 @@ class Life:
         await self.start(name)
 
 
-class Recorded:
-    """What generation took, and the messages that it took by their numbers; as they travel."""
-
-    def __init__(self, hub: MemoryHub) -> None:
-        self._bus: Bus = hub.join("watcher", "observer")
-        self._inbox = self._bus.subscribe(
-            keys.taken("generation"), f"{keys.PREFIX}/evt/**", f"{keys.PREFIX}/state/**", capacity=10**6
-        )
-        self.lives: dict[str, list[Taken]] = {}
-        self.messages: dict[tuple[str, int], Received] = {}
-
-    async def read(self) -> None:
-        while (received := self._inbox.take()) is not None:
-            if received.key == keys.taken("generation"):
-                told = decode(encode(received.message))
-                assert isinstance(told, Taken)
-                self.lives.setdefault(told.session, []).append(told)
-            self.messages[received.life, received.number] = received
-        self._inbox.close()
-        await self._bus.leave()
-
-    def again(self, session: str) -> Again:
-        clock = StepClock(self.lives[session][0].at.clock)
-        life = Again(GenerationIntake("robot", CONFIG, clock, session), clock, Content)
-        for taken in self.lives[session]:
-            life.take(taken, lambda life, number: self.messages.get((life, number)))
-        return life
-
-
-async def recorded(hub: MemoryHub, seed: int, lives: int = 1) -> Recorded:
-    record, chance = Recorded(hub), Random(seed)
+async def recorded(hub: MemoryHub, seed: int, lives: int = 1) -> RecordedLives:
+    record = RecordedLives(
+        hub, "generation", lambda clock, session: GenerationIntake("robot", CONFIG, clock, session), Content
+    )
+    chance = Random(seed)
     for _ in range(lives):
         await Life(hub, chance).lived(90.0)
         await asyncio.sleep(keys.HISTORY_MAX_AGE + 0.1)
@@ -282,20 +255,11 @@ async def test_all_that_can_happen_to_a_fragment_happens(hub: MemoryHub) -> None
 async def test_a_step_that_took_something_else_is_noticed_and_named(hub: MemoryHub, tag: str) -> None:
     record = await recorded(hub, 2)
     [(session, ledger)] = record.lives.items()
-    place, changed = next(
-        (place, number)
-        for place, taken in enumerate(ledger)
-        for number, step in enumerate(taken.steps)
-        if step.content and step.content["type"] == tag and step.led_to
-    )
-    step = ledger[place].steps[changed]
-    other = replace(step, content=step.content | {"id": "another"})
-    steps = (*ledger[place].steps[:changed], other, *ledger[place].steps[changed + 1 :])
-    ledger[place] = replace(ledger[place], steps=steps)
+    changed = changed_step(ledger, tag, id="another")
 
     first = record.again(session).differences[0]
 
-    assert first.number == ledger[place].first + changed
+    assert first.number == changed
     assert first.step.content["id"] == "another"
 
 
