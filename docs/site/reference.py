@@ -55,6 +55,8 @@ BESIDE = {
 """What the public names take and return, by its place in the package."""
 RAISES = re.compile(r"^Raises:\n((?:    .*(?:\n|$)|\n)+)", re.MULTILINE)
 RAISED = re.compile(r"^    (\w+): (.*(?:\n {5,}.*)*)", re.MULTILINE)
+SHOWN = {name.rpartition(".")[2] for names in (*SECTIONS.values(), *BESIDE.values()) for name in names}
+"""Names of all classes and functions that the page has."""
 
 
 def page() -> str:
@@ -77,7 +79,7 @@ def _entry(thing: type, where: str = "") -> str:
     if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
         return _directive("function", _signature(node), _options(node), _function(node), 4)
     assert isinstance(node, ast.ClassDef)
-    members = {each.name: each for each in node.body if isinstance(each, ast.FunctionDef | ast.AsyncFunctionDef)}
+    members = {name: each for part in (*_hidden_bases(thing), node) for name, each in _functions(part).items()}
     making = members.get("__init__")
     is_made_by_users = making is not None and ast.get_docstring(making) is not None
     signature = _signature(making).replace("__init__", node.name) if is_made_by_users else node.name
@@ -89,8 +91,23 @@ def _entry(thing: type, where: str = "") -> str:
     return _directive(kind, signature.replace(" -> None", ""), (), "\n".join(body), 5)
 
 
+def _functions(node: ast.ClassDef) -> dict[str, ast.FunctionDef | ast.AsyncFunctionDef]:
+    return {each.name: each for each in node.body if isinstance(each, ast.FunctionDef | ast.AsyncFunctionDef)}
+
+
+def _hidden_bases(thing: type) -> list[ast.ClassDef]:
+    """Bases that stand nowhere on the page, the most general first: what they have is told as the class' own."""
+    hidden = [base for base in reversed(thing.__mro__[1:]) if _is_ours(base) and base.__name__ not in SHOWN]
+    nodes = [node for base in hidden for node in ast.parse(inspect.getsource(base)).body]
+    return [node for node in nodes if isinstance(node, ast.ClassDef)]
+
+
+def _is_ours(base: type) -> bool:
+    return base.__module__.startswith("engage_hri")
+
+
 def _bases(thing: type) -> list[str]:
-    ours = [f"`{base.__name__}`" for base in thing.__bases__ if base.__module__.startswith("engage_hri")]
+    ours = [f"`{base.__name__}`" for base in thing.__bases__ if _is_ours(base) and base.__name__ in SHOWN]
     return [f"Is a {', '.join(ours)}.\n"] if ours and not issubclass(thing, msgspec.Struct) else []
 
 
