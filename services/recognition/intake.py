@@ -118,7 +118,7 @@ class Intake:
         self._note_error(said.actor, said.began, began)
         words = TimedWords(
             actor=said.actor, id=said.id, text=said.text, began=began, ended=ended, final=said.final,
-            confidence=said.confidence,
+            confidence=said.confidence, to=frozenset(said.to) or None,
         )  # fmt: skip
         self._feed(words, at)
 

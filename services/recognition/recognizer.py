@@ -14,10 +14,13 @@ from itertools import count
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.perception import HeadPose, VoiceActivity
+from engage_hri.schemas.recognition import RequestEvent, SignalTurn
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.interrupted_looks import InterruptedLooks, Symbolic
+from engage_hri.services.recognition.events.limits import BLOCKS_KEPT
 from engage_hri.services.recognition.events.machine import Effect, Mishap, PersonForgotten
 from engage_hri.services.recognition.events.scene import Covered
 from engage_hri.services.recognition.events.session import SETTLING, Observation, Session
@@ -52,6 +55,8 @@ class Recognizer:
         """Bugs that have shown and are not reported yet."""
         self._covered = Covered(frozenset())
         self._now: Seconds = -math.inf
+        self._unaddressed: Latest[str, Seconds] = Latest(BLOCKS_KEPT)
+        """Blocks in which the robot began to speak, in company, before it was known to whom; and when."""
 
     @property
     def deadline(self) -> Seconds | None:
@@ -169,6 +174,13 @@ class Recognizer:
 
     def _wait(self, observation: Observation | Covered, at: Seconds) -> None:
         match observation:
+            case RequestEvent() | SignalTurn():
+                self.session.announce(observation)
+                self._unaddressed.pop(observation.block, None)
+            case ActionBegan(actor=self.session.robot, action="speak", behavior=behavior) if (
+                self.session.in_company and self.session.addressees_of(behavior) is None
+            ):
+                self._unaddressed[behavior.rpartition(":")[0]] = at
             case ActionBegan(actor=actor) | ActionEnded(actor=actor) if actor != self.session.robot:
                 self._words.follow(observation, at)
             case GoesOn(began=began, since=since) if began.actor != self.session.robot:
@@ -179,5 +191,5 @@ class Recognizer:
     def _settled(self) -> Seconds:
         """Time before which nothing more can become known, except what takes longer than the time to settle."""
         longest = SETTLING
-        undecided = (*self._attention.undecided, *self._interrupted.undecided)
+        undecided = (*self._attention.undecided, *self._interrupted.undecided, *self._unaddressed.values())
         return min((since for since in undecided if self._now < since + longest), default=math.inf)

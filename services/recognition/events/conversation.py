@@ -22,9 +22,11 @@ Ours."""
 
 
 class Conversation:
-    """Conversation of one person with the robot."""
+    """Conversation of one person with the robot. robot_speaks: the robot speaks to the person already."""
 
-    def __init__(self, id: str, scene: SessionScene, config: RecognitionConfig, writer: EventWriter) -> None:
+    def __init__(
+        self, id: str, scene: SessionScene, config: RecognitionConfig, writer: EventWriter, *, robot_speaks: bool
+    ) -> None:
         self.id = id
         self.speaks_since: Seconds | None = None
         self.silent_since: Seconds | None = None
@@ -35,6 +37,8 @@ class Conversation:
         own, each with the block of that turn."""
         self.own_backchannel = Backchannel(writer, limit=config.backchannel_limit)
         self.robot_backchannel = Backchannel(writer, limit=config.backchannel_limit)
+        self.robot_speaks_now = robot_speaks
+        """True while the robot speaks to this person."""
         self._speech_confidence: Probability = 1.0
         self._brief: tuple[Seconds, Seconds | None] | None = None
         """Beginning and end of the person's last speech within the robot's turn, if it has been no answer so far."""
@@ -81,7 +85,12 @@ class Conversation:
 
     @property
     def robot_holds_floor(self) -> bool:
-        return self._scene.robot_speaks_since is not None or self.pair.robot_holds_turn
+        return self.robot_speaks_now or self.pair.robot_holds_turn
+
+    @property
+    def is_spoken_to(self) -> bool:
+        """True while the robot speaks to the person, or waits for an answer."""
+        return self.robot_holds_floor or self.pair.may_be_answered_with("speak")
 
     @property
     def holds_floor(self) -> bool:
@@ -91,7 +100,6 @@ class Conversation:
         if self.speaks_since is not None:
             return
         self.speaks_since, self.silent_since = at, None
-        self._scene.speaks(self.id)
         self._speech_confidence = confidence
         # A line that was typed has no length by which it could be judged: who sends one has something to say.
         if self.robot_holds_floor and self._scene.lines.get(self.id) != at:
@@ -106,7 +114,6 @@ class Conversation:
         if self.speaks_since is None:
             return
         self.speaks_since, self.silent_since = None, at
-        self._scene.falls_silent(self.id, at)
         since = self.own_backchannel.undecided_since
         if since is not None:
             if self._listens(since) is False:
@@ -161,6 +168,9 @@ class Conversation:
     def points(self, at: Seconds, confidence: Probability = 1.0) -> None:
         self.pair.human_begins("point", at, confidence)
 
+    def point_ends(self, at: Seconds) -> None:
+        self.pair.ends("point", at, by_robot=False)
+
     def manipulates(self, at: Seconds, confidence: Probability = 1.0) -> None:
         if self.acts_since is None:
             self.acts_since = at
@@ -174,7 +184,6 @@ class Conversation:
         """Take an action of the person that goes on, known only now. It may be the answer, or more of a turn."""
         if action == "speak" and self.speaks_since is None:
             self.speaks_since, self.silent_since = since, None
-            self._scene.speaks(self.id)
         elif action == "act":
             self.acts_since = since
         if self.pair.event is None or since < self.pair.event.started:
@@ -201,25 +210,28 @@ class Conversation:
 
     # -- the robot ----------------------------------------------------------------------------------------------
 
-    def robot_speaks(self, at: Seconds, behavior: str) -> None:
+    def robot_speaks(self, at: Seconds, *, listens: bool) -> None:
+        """Take the beginning of the robot's speech. listens: it is a backchannel that was announced."""
+        self.robot_speaks_now = True
         self.pair.robot_heard(None)
         if self.holds_floor and not self.pair.robot_holds_turn:
             if self.robot_backchannel.state != BRIEF:
                 self.robot_backchannel.speaks(self._backchannel(self.id, self._scene.robot, at))
-        elif not self._scene.is_listening(behavior):
+        elif not listens:
             self.pair.robot_begins("speak", at)
             self.pair.forget_unanswered()
 
     def robot_falls_silent(self, at: Seconds) -> None:
+        self.robot_speaks_now = False
         self.pair.robot_heard(at)
         self._backchannel_speech_ends(self.robot_backchannel, at)
         self._ends("speak", at, by_robot=True)
         self._floor_is_free(at)
 
-    def robot_gestures(self, action: Action, at: Seconds, behavior: str) -> None:
-        """Take a nod, a shake or a point of the robot."""
+    def robot_gestures(self, action: Action, at: Seconds, *, listens: bool) -> None:
+        """Take a nod, a shake or a point of the robot. listens: it is a backchannel that was announced."""
         if not self.holds_floor or action == "point":
-            if not self._scene.is_listening(behavior):
+            if not listens:
                 self.pair.robot_begins(action, at)
         elif self.robot_backchannel.state == IDLE:
             self.robot_backchannel.gestures(self._backchannel(self.id, self._scene.robot, at))
@@ -227,6 +239,7 @@ class Conversation:
     def robot_goes_on(self, action: Action, since: Seconds) -> None:
         """Take speech or a gesture of the robot that goes on, known only now. It may be the answer."""
         if action == "speak":
+            self.robot_speaks_now = True
             self.pair.robot_heard(None)
         if self.pair.event is not None and since >= self.pair.event.started:
             self.pair.robot_begins(action, since)
@@ -238,7 +251,7 @@ class Conversation:
 
     def turn_ends(self, at: Seconds) -> None:
         # Before the pair is decided: of several answers during the turn the one that began first counts.
-        if self._scene.robot_speaks_since is None:
+        if not self.robot_speaks_now:
             self._keep_floor(at)
         self.pair.turn_ends(at)
         self._floor_is_free(at)
@@ -291,6 +304,11 @@ class Conversation:
             self.pair.abort(at)
             self._floor_is_free(at)
 
+    def withdraw(self, event: OngoingEvent, at: Seconds, *, is_orphan: bool) -> None:
+        """Withdraw a pair of the robot; see `PersonRecognition.withdraw`."""
+        if self.pair.event is event and (self.pair.robot_holds_turn or not is_orphan):
+            self.pair.abort(at)
+
     def block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
         for pair, answer in self._cut_into:
             if answer == block:
@@ -301,6 +319,20 @@ class Conversation:
             self.robot_backchannel.ends(at)
         self._floor_is_free(at)
 
+    def answered_block_ended(self, at: Seconds) -> None:
+        self.pair.answered_block_ended(at)
+
+    def robot_announces(self, event: OngoingEvent, ended: Seconds | None) -> None:
+        """Begin the robot's backchannel, unless it has been noticed. ended: when its block was over, if it was."""
+        noticed = self.robot_backchannel.last
+        if noticed is not None and abs(event.started - noticed[0]) <= self._config.backchannel_limit:
+            self._writer.answer(event.request, noticed[1], event.started)
+            event.request = ""
+        else:
+            self.robot_backchannel.announced(event)
+        if ended is not None:
+            self.robot_backchannel.ends(max(event.started, ended))
+
     def robot_asks(self, event: OngoingEvent) -> None:
         if self.robot_backchannel.state == UNDECIDED:
             self.robot_backchannel.takes_floor("outlasts_turn", event.started)
@@ -309,7 +341,7 @@ class Conversation:
             self._cut_into.append((self.pair, event.block))
             self.pair = self._new_pair(self._writer, self._config)
         self.pair.robot_asks(event)
-        if self._scene.robot_speaks_since is not None:
+        if self.robot_speaks_now:
             self.pair.robot_heard(None)
 
     def _pairs(self) -> Iterator[AdjacencyPair]:

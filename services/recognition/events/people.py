@@ -42,6 +42,7 @@ class People:
             self._met += 1
             person = PersonRecognition(id, self._met, self._scene, self._config, self._writer)
             self.persons[id] = self._here[id] = person
+            self._scene.present.add(id)
         return self.persons[id]
 
     def see(self, world: World, at: Seconds) -> None:
@@ -74,6 +75,7 @@ class People:
                 self._apply(person, now, lambda person: person.leave(now))
             self._agenda.clear(id)
             self._here.pop(id, None)
+            self._scene.forget_person(id)
             del self.persons[id], self._unseen[id]
             self._writer.effects.append(PersonForgotten(id))
             self._follow_speech(now)
@@ -143,9 +145,13 @@ class People:
         """Note when the person is due, and whether it is here."""
         self._agenda.set(person.id, person.deadline)
         here, was_here = person.presence.here, person.id in self._here
+        (self._scene.found.add if here and person.presence.reported else self._scene.found.discard)(person.id)
         if was_here and not here:
             del self._here[person.id]
+            self._scene.present.discard(person.id)
             self._note(person, person.presence.left_at)
         elif here and not was_here:
             self._here[person.id] = person
+            self._scene.present.add(person.id)
+            person.talk.person_back()
             self._here = dict(sorted(self._here.items(), key=lambda one: one[1].number))

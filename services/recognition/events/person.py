@@ -8,7 +8,6 @@ from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import Action, EventKind
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.conversation import Conversation
 from engage_hri.services.recognition.events.directed_gaze import HUMAN_DIRECTING, DirectedGaze
 from engage_hri.services.recognition.events.history import ActionHistory
 from engage_hri.services.recognition.events.limits import LimitClock, in_time
@@ -17,6 +16,7 @@ from engage_hri.services.recognition.events.mutual_facial_gaze import HUMAN_WAIT
 from engage_hri.services.recognition.events.presence import FacePresence
 from engage_hri.services.recognition.events.scene import GazeState, SessionScene
 from engage_hri.services.recognition.events.shared_gaze import SharedGaze
+from engage_hri.services.recognition.events.talk import Talk
 
 DIRECT_BY_LOOK: Seconds = 0.6
 """Time for which a person looks at an object before that directs the robot's gaze: a shorter look takes in the scene.
@@ -61,7 +61,7 @@ class PersonRecognition:
         self.gaze = GazeState()
         self.directed: list[DirectedGaze] = []
         self.facial = MutualFacialGaze(writer)
-        self.conversation = Conversation(id, scene, config, writer)
+        self.talk = Talk(id, scene, config, writer)
         self.history = ActionHistory(ACTIONS_KEPT)
         self._doing: dict[Action, _Doing] = {}
         """Present actions other than looking."""
@@ -76,7 +76,7 @@ class PersonRecognition:
     def deadline(self) -> Seconds | None:
         """Time of the next step that is due by itself, unless an input comes before; then call `pass_time`."""
         times = [self.gaze.deadline, self.presence.deadline, self.facial.deadline, self._look_directs_at]
-        times += self.conversation.deadlines
+        times += self.talk.deadlines
         times += [one.deadline for one in self.directed]
         times += [one.until for one in self._doing.values()]
         return min([at for at in times if at is not None], default=None)
@@ -88,7 +88,7 @@ class PersonRecognition:
         yield self.presence.deadline, self.leave
         yield from ((one.deadline, partial(self._expire_directed, one)) for one in self.directed)
         yield self.facial.deadline, self.facial.expire
-        yield from self.conversation.timed_steps
+        yield from self.talk.timed_steps
         yield self._look_directs_at, self._look_directs
         yield from ((one.until, self._goes_on_too_long) for one in self._doing.values())
 
@@ -99,7 +99,7 @@ class PersonRecognition:
     @property
     def _look_directs_at(self) -> Seconds | None:
         """Time at which the person's look has lasted long enough to direct the robot's; None if it does not."""
-        if self.gaze.spent or self.gaze.ended is not None or self.conversation.acts_since is not None:
+        if self.gaze.spent or self.gaze.ended is not None or "act" in self._doing:
             return None
         if not any(map(self._scene.is_object, self.gaze.targets)):
             return None
@@ -113,7 +113,7 @@ class PersonRecognition:
             one.person_gone(at, until)
         self.forget_idle(at)
         self.facial.person_gone(at, until)
-        self.conversation.person_gone(at, until)
+        self.talk.person_gone(at, until)
         self.gaze = GazeState(since=until)
         self._doing.clear()
         self._scene.stops(self.id, until)
@@ -136,12 +136,13 @@ class PersonRecognition:
             case "point":
                 self.points(targets, at, confidence)
             case "speak":
-                self.conversation.speaks(at, confidence)
+                self._scene.speaks(self.id)
+                self.talk.speaks(at, confidence, self._face)
             case "nod" | "shake":
-                self.conversation.gestures(action, at, confidence)
+                self.talk.shows(at, self._face, lambda talk: talk.gestures(action, at, confidence))
             case "act":
                 self._scene.acting.add(self.id)
-                self.conversation.manipulates(at, confidence)
+                self.talk.shows(at, self._face, lambda talk: talk.manipulates(at, confidence))
 
     def goes_on(self, began: ActionBegan, since: Seconds, at: Seconds) -> None:
         """Take an action that goes on, known only now: it answers what waits for it, and begins nothing itself."""
@@ -160,7 +161,9 @@ class PersonRecognition:
             self._doing[action] = _Doing(targets, since, at + self._longest(action))
             if action == "act":
                 self._scene.acting.add(self.id)
-            self.conversation.goes_on(action, since, began.confidence)
+            if action == "speak":
+                self._scene.speaks(self.id)
+            self.talk.goes_on(action, since, at, began.confidence, self._face)
 
     def ends(self, ended: ActionEnded, at: Seconds) -> None:
         if not self.history.is_new(ended, at):
@@ -176,15 +179,16 @@ class PersonRecognition:
         del self._doing[action]
         match action:
             case "point":
-                self.conversation.pair.ends("point", at, by_robot=False)
+                self.talk.take(at, lambda talk: talk.point_ends(at))
             case "speak":
-                self.conversation.falls_silent(at)
+                self._scene.falls_silent(self.id, at)
+                self.talk.falls_silent(at)
             case "nod" | "shake":
-                self.conversation.gesture_ends(action, at)
+                self.talk.take(at, lambda talk: talk.gesture_ends(action, at))
             case "act":
                 self.gaze.spent = True
                 self._scene.acting.discard(self.id)
-                self.conversation.manipulation_ends(at)
+                self.talk.take(at, lambda talk: talk.manipulation_ends(at))
 
     def _longest(self, action: Action) -> Seconds:
         if action == "speak":
@@ -202,6 +206,11 @@ class PersonRecognition:
     def on_robots_face(self) -> bool:
         return self._scene.robot in self.gaze.targets
 
+    @property
+    def _face(self) -> str:
+        """Whose face the person looks at; "": nobody's."""
+        return next(filter(self._scene.is_face, self.gaze.targets), "")
+
     def looks(self, targets: tuple[str, ...], at: Seconds, confidence: Probability = 1.0) -> None:
         was_on_face = self.on_robots_face
         if not self.gaze.begin(targets, at, confidence):
@@ -216,6 +225,7 @@ class PersonRecognition:
     def gaze_changed(self, at: Seconds) -> None:
         """Pass a change of the person's or the robot's gaze on to the recognizers."""
         confidence = self.gaze.confidence
+        self.talk.looks_at(self._face, at)
         robot_on = self._scene.robot_looks_at((self.id,))
         self.facial.gazes(robot_on=robot_on, human_on=self.on_robots_face, at=at, confidence=confidence)
         for one in self.directed:
@@ -261,7 +271,7 @@ class PersonRecognition:
         objects = tuple(filter(self._scene.is_object, targets))
         if objects:
             self._human_directs(objects, at, at, confidence)
-        self.conversation.points(at, confidence)
+        self.talk.shows(at, self._face, lambda talk: talk.points(at, confidence))
 
     def _look_directs(self, at: Seconds) -> None:
         self.gaze.spent = True
@@ -319,7 +329,7 @@ class PersonRecognition:
 
     def abort(self, at: Seconds, *, turn: str) -> None:
         """Withdraw the events that the robot began in a turn that was cut off."""
-        self.conversation.abort(at, turn=turn)
+        self.talk.take(at, lambda talk: talk.abort(at, turn=turn))
         for machine in self.gaze_machines():
             if machine.event is not None and turn and machine.event.turn == turn:
                 machine.block_ended(at, aborted=True)
@@ -330,7 +340,7 @@ class PersonRecognition:
             if machine.event is not None and machine.event.block == block:
                 machine.block_ended(at, aborted=aborted)
         self.forget_idle(at)
-        self.conversation.block_ended(block, at, aborted=aborted)
+        self.talk.take(at, lambda talk: talk.block_ended(block, at, aborted=aborted))
 
     def withdraw(self, event: OngoingEvent, at: Seconds, *, is_orphan: bool) -> None:
         """Withdraw an event of the robot.
@@ -338,10 +348,8 @@ class PersonRecognition:
         is_orphan: whoever asked for it is gone. What the robot has said until the end of its turn is answered all the
         same, so that such a pair stays.
         """
-        pair = self.conversation.pair
-        if pair.event is event:
-            if pair.robot_holds_turn or not is_orphan:
-                pair.abort(at)
+        if event.kind == "adjacency_pair":
+            self.talk.take(at, lambda talk: talk.withdraw(event, at, is_orphan=is_orphan))
             return
         for machine in self.gaze_machines():
             if machine.event is event:

@@ -8,10 +8,13 @@ from engage_hri.schemas.attention import Claim
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import GazeResolution
+from engage_hri.services.recognition.events.addressing import Addressees, Spoken
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT
 
 LINES_KEPT = 256
+SPOKEN_KEPT = 32
+"""Number of speeches of all that are remembered with their addressees."""
 SAME_INSTANT: Seconds = 0.001
 """Longest gap between two looks at the same target that count as one."""
 
@@ -41,6 +44,8 @@ class Worded(Struct, frozen=True, kw_only=True):
     text: str
     is_alone: bool = False
     is_line: bool = False
+    to: Addressees | None = None
+    """Addressees, if perception knows them."""
 
 
 class GazeState(Struct):
@@ -89,6 +94,8 @@ class SessionScene:
         self.resolution = resolution
         self.gaze = GazeState()
         self.robot_speaks_since: Seconds | None = None
+        self.robot_spoken: Spoken | None = None
+        """What the robot says now."""
         self.head_owner = Claim(kind="none", priority=0)
         self.people_in_world: frozenset[str] = frozenset()
         self.covered = Covered(frozenset())
@@ -101,6 +108,18 @@ class SessionScene:
         self._speakers: set[str] = set()
         self.lines: Latest[str, Seconds] = Latest(LINES_KEPT)
         """When each person last sent a line that was typed."""
+        self.present: set[str] = set()
+        """People who are here, as far as is known."""
+        self.found: set[str] = set()
+        """Those of whom perception reports that it sees them."""
+        self.names: dict[str, str] = {robot.casefold(): robot}
+        """Actor ids by what people call them."""
+        self.tells_addressees = False
+        """True if perception has ever told to whom somebody speaks."""
+        self.told_addressees: Latest[tuple[str, Seconds], Addressees] = Latest(SPOKEN_KEPT)
+        """To whom a speech is by perception, by speaker and start, if that is told before the speech."""
+        self.spoken: list[Spoken] = []
+        """The latest speeches whose addressees are known, of all."""
         self.listening_blocks: Latest[str, None] = Latest(BLOCKS_KEPT)
         """Blocks under way that the robot has announced as backchannels: they answer nobody."""
         self.speech = 0
@@ -116,12 +135,42 @@ class SessionScene:
             if entity.kind in ("person", "hand"):
                 self._others.pop(entity.id, None)
                 self._others[entity.id] = at
+        for person in world.people:
+            if person.id != self.robot:
+                self.names |= {name.casefold(): person.id for name in (person.id, person.name) if name}
         self.people_in_world = frozenset(person.id for person in world.people) - {self.robot}
 
     def forget_others(self, before: Seconds) -> None:
         """Forget the people and hands that have not been seen since `before`."""
         while self._others and (oldest := next(iter(self._others))) and self._others[oldest] < before:
             del self._others[oldest]
+
+    def company(self, person: str) -> set[str]:
+        """People who are seen here besides this one. Who is only heard of may be a name that a recognizer made up."""
+        return (self.present & (self.people_in_world | self.found)) - {person}
+
+    def forget_person(self, person: str) -> None:
+        self.present.discard(person)
+        self.found.discard(person)
+        self.names = {name: id for name, id in self.names.items() if id != person}
+
+    def is_face(self, target: str) -> bool:
+        """True if a look at `target` is one at the face of a person or of the robot."""
+        return target == self.robot or target in self.present
+
+    def note_spoken(self, spoken: Spoken) -> None:
+        """Remember a speech whose addressees are known now."""
+        self.spoken = [*self.spoken[1 - SPOKEN_KEPT :], spoken]
+
+    def robot_speaks_to(self, person: str) -> bool:
+        """True while the robot speaks to this person, or to nobody known."""
+        return self.robot_spoken is not None and self.robot_spoken.is_to(person)
+
+    def robot_falls_silent(self, at: Seconds) -> None:
+        if self.robot_spoken is not None:
+            self.robot_spoken.until = at
+        self.robot_speaks_since = self.robot_spoken = None
+        self.falls_silent(self.robot, at)
 
     def is_listening(self, behavior: str) -> bool:
         """True if a behavior of the robot, `block:behavior`, is part of an announced backchannel."""

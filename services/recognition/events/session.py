@@ -13,7 +13,7 @@ from typing import get_args
 
 from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.attention import HeadOwner
-from engage_hri.schemas.behaviors import Action, Event
+from engage_hri.schemas.behaviors import Action, Event, TurnSignal
 from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
@@ -22,13 +22,15 @@ from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.events.addressing import EVERYBODY, Addressees, Spoken
 from engage_hri.services.recognition.events.conversation import TURN_PATIENCE
 from engage_hri.services.recognition.events.history import ActionHistory, Latest
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock, anchor
-from engage_hri.services.recognition.events.machine import Effect, EventWriter, OngoingEvent
+from engage_hri.services.recognition.events.machine import Effect, EventWriter, Mishap, OngoingEvent
 from engage_hri.services.recognition.events.people import People
 from engage_hri.services.recognition.events.person import PersonRecognition
 from engage_hri.services.recognition.events.scene import Covered, SessionScene, Worded
+from engage_hri.services.recognition.events.talk import Step
 from engage_hri.services.reports.ongoing_actions import GoesOn
 
 WORDS_PATIENCE: Seconds = 10.0
@@ -79,11 +81,20 @@ class Session:
         """Blocks that answer a person, with the id of that person (empty: all)."""
         self._history = ActionHistory(ACTIONS_KEPT)
         """The robot's actions."""
+        self._addressed: Latest[str, Addressees] = Latest(BLOCKS_KEPT)
+        """To whom the robot speaks in each block."""
+        self._turn: tuple[str, Addressees] | None = None
+        """The robot's turn that has not ended, and to whom it is."""
 
     @property
     def persons(self) -> dict[str, PersonRecognition]:
         """Persons who are here, or have not been gone for long."""
         return self._people.persons
+
+    @property
+    def in_company(self) -> bool:
+        """True if more than one person is here."""
+        return len(self.scene.company("")) > 1
 
     @property
     def busy(self) -> Set[str]:
@@ -141,9 +152,7 @@ class Session:
             case Worded(actor=actor, since=since):
                 if observation.is_line:
                     self.scene.lines[actor] = since
-                self._writer.understand(actor, since, observation.text, at)
-                if actor in self.persons:
-                    self._people.apply(actor, at, lambda person: person.conversation.understand(since))
+                self._understand(observation, at)
             case RequestEvent():
                 self._request(observation, at)
             case SignalTurn():
@@ -173,9 +182,19 @@ class Session:
         """Begin anew with this person after a failure: its open events end as lost."""
         if person in self.persons:
             self._people.lose_track(self.persons[person], at)
+            self._lose_untold(person, at)
         return self._take()
 
+    def _lose_untold(self, person: str, at: Seconds) -> None:
+        """End the events that were asked for and not begun yet: a bug has shown before, or while they waited."""
+        for event in list(self._live.values()):
+            if not event.id and event.request and person in (event.initiator, event.responder):
+                self._writer.publish(event, "started", at)
+                self._writer.publish(event, "lost", at)
+
     def _take(self) -> list[Effect]:
+        for mishap in [effect for effect in self._writer.effects if isinstance(effect, Mishap)]:
+            self._lose_untold(mishap.actor, mishap.at)
         effects = self._writer.take()
         for effect in effects:
             if isinstance(effect, EventOutcome):
@@ -195,14 +214,47 @@ class Session:
                 self._robot_actions[began.behavior, "speak"] = began
                 self._heard_at = None
                 if self.scene.robot_speaks_since is None:
-                    self.scene.robot_speaks_since = at
-                    self.scene.speaks(self.robot)
-                    self._people.apply_to_all(at, lambda person: person.conversation.robot_speaks(at, began.behavior))
+                    self._robot_speaks(began, at)
+                    listens = self.scene.is_listening(began.behavior)
+                    self._say(began, at, lambda talk: talk.robot_speaks(at, listens=listens))
             case "nod" | "shake" | "point":
                 self._robot_actions[began.behavior, began.action] = began
-                self._people.apply_to_all(
-                    at, lambda person: person.conversation.robot_gestures(began.action, at, began.behavior)
-                )
+                listens = self.scene.is_listening(began.behavior)
+                self._say(began, at, lambda talk: talk.robot_gestures(began.action, at, listens=listens))
+
+    def _robot_speaks(self, began: ActionBegan, at: Seconds) -> None:
+        self.scene.robot_speaks_since = at
+        self.scene.speaks(self.robot)
+        self.scene.robot_spoken = Spoken(self.robot, self.addressees_of(began.behavior) or EVERYBODY, at)
+        self.scene.note_spoken(self.scene.robot_spoken)
+
+    def _say(self, began: ActionBegan, at: Seconds, step: Step) -> None:
+        """Tell what the robot says or shows to those to whom it is; to all if that is not known."""
+        to = self.addressees_of(began.behavior)
+        if to is None:
+            self._tell("", at, step)
+        else:
+            for actor in to:
+                self._tell(actor, at, step)
+
+    def addressees_of(self, behavior: str) -> Addressees | None:
+        """To whom a behavior of the robot, `block:behavior`, is; None: to nobody known."""
+        block = behavior.rpartition(":")[0]
+        if block in self._addressed:
+            return self._addressed[block]
+        return None if self._turn is None else self._turn[1]
+
+    def announce(self, observation: Observation) -> None:
+        """Learn to whom a block of the robot is. It may be called before the observation itself is fed."""
+        match observation:
+            case RequestEvent(event=Event(responder=actor), block=block):
+                pass
+            case SignalTurn(signal=TurnSignal(signal="answered" | "repaired", actor=str(actor)), block=block):
+                pass
+            case _:
+                return
+        if actor and block:
+            self._addressed[block] = self._addressed.get(block, frozenset()) | {actor}
 
     def _robot_goes_on(self, began: ActionBegan, since: Seconds, at: Seconds) -> None:
         """Take an action of the robot that goes on: it answers a person who waits, and begins nothing else."""
@@ -217,9 +269,8 @@ class Session:
         self._robot_actions[began.behavior, began.action] = began
         if began.action == "speak" and self.scene.robot_speaks_since is None:
             self._heard_at = None
-            self.scene.robot_speaks_since = since
-            self.scene.speaks(self.robot)
-        self._people.apply_to_all(at, lambda person: person.conversation.robot_goes_on(began.action, since))
+            self._robot_speaks(began, since)
+        self._say(began, at, lambda talk: talk.robot_goes_on(began.action, since))
 
     def _robot_ends(self, ended: ActionEnded, at: Seconds) -> None:
         if not self._history.is_new(ended, at):
@@ -231,11 +282,22 @@ class Session:
             case "speak":
                 speaks = any(action == "speak" for _, action in self._robot_actions)
                 if self.scene.robot_speaks_since is not None and not speaks:
-                    self.scene.robot_speaks_since = None
-                    self.scene.falls_silent(self.robot, at)
-                    self._people.apply_to_all(at, lambda person: person.conversation.robot_falls_silent(at))
+                    self.scene.robot_falls_silent(at)
+                    self._tell("", at, lambda talk: talk.robot_falls_silent(at))
             case "nod" | "shake" | "point":
-                self._people.apply_to_all(at, lambda person: person.conversation.robot_gesture_ends(ended.action, at))
+                self._tell("", at, lambda talk: talk.robot_gesture_ends(ended.action, at))
+
+    def _understand(self, words: Worded, at: Seconds) -> None:
+        """Take the words of a person's speech, and to whom perception says that they are."""
+        if words.to is not None:
+            self.scene.tells_addressees = True
+            self.scene.told_addressees[words.actor, words.since] = words.to
+        if words.text:
+            self._writer.understand(words.actor, words.since, words.text, at)
+        if words.actor in self.persons:
+            self._people.apply(
+                words.actor, at, lambda person: person.talk.understand(words.since, words.text, words.to, at)
+            )
 
     def _robot_is_heard(self, is_speaking: bool, at: Seconds) -> None:
         """End speech with a lost end: the body showed that it speaks, and for `SILENCE` no longer does."""
@@ -278,10 +340,8 @@ class Session:
         )  # fmt: skip
         self._writer.effects.append(Accepted(id=request.id, within=self._within(event, wanted)))
         self._live[request.id] = event
+        self.announce(request)
         self._people.apply(wanted.responder, at, lambda person: self._begin(person, event, wanted))
-        if event.request and not event.id:  # a bug has shown before the event could be published
-            self._writer.publish(event, "started", at)
-            self._writer.publish(event, "lost", at)
 
     def _begin(self, person: PersonRecognition, event: OngoingEvent, wanted: Event) -> None:
         """Begin the robot's event with this person."""
@@ -294,8 +354,6 @@ class Session:
                 self._ask(person, event, wanted)
             case "backchannel":
                 self._announce_backchannel(person, event)
-                if (ended := self.blocks.ended.get(event.block)) is not None:
-                    person.conversation.robot_backchannel.ends(max(event.started, ended))
 
     def _fault_in(self, request: RequestEvent) -> Fault | None:
         event, where = request.event, f"{request.block}: {request.event.id}"
@@ -351,22 +409,32 @@ class Session:
 
     def _ask(self, person: PersonRecognition, event: OngoingEvent, wanted: Event) -> None:
         event.accept = wanted.accept or ACCEPT
-        person.conversation.robot_asks(event)
-        turn_end = self._ended_turns.get(event.turn) if event.turn else self.blocks.ended.get(event.block)
-        if turn_end is not None:
-            person.conversation.turn_ends(max(turn_end, event.started))
+        at, turn_end = (
+            event.started,
+            self._ended_turns.get(event.turn) if event.turn else self.blocks.ended.get(event.block),
+        )
+        person.talk.take(at, lambda talk: talk.robot_asks(event))
+        if turn_end is None:
+            self._opens(event.turn, event.responder)
+        else:
+            person.talk.take(at, lambda talk: talk.turn_ends(max(turn_end, at)))
+
+    def _opens(self, turn: str, addressee: str) -> None:
+        """Note a turn of the robot that goes on over several blocks."""
+        if turn and addressee:
+            before = self._turn[1] if self._turn is not None and self._turn[0] == turn else frozenset()
+            self._turn = (turn, before | {addressee})
+
+    def _closes(self, turn: str) -> None:
+        if self._turn is not None and self._turn[0] == turn:
+            self._turn = None
 
     def _announce_backchannel(self, person: PersonRecognition, event: OngoingEvent) -> None:
         """Begin the robot's backchannel, unless noticed already. The person holds the floor: it is the initiator."""
         event.initiator, event.responder = person.id, self.robot
         self.scene.listening_blocks[event.block] = None
-        backchannel = person.conversation.robot_backchannel
-        noticed = backchannel.last
-        if noticed is not None and abs(event.started - noticed[0]) <= self._config.backchannel_limit:
-            self._writer.answer(event.request, noticed[1], event.started)
-            event.request = ""
-        else:
-            backchannel.announced(event)
+        ended = self.blocks.ended.get(event.block)
+        person.talk.take(event.started, lambda talk: talk.robot_announces(event, ended))
 
     def _cancel(self, cancel: Cancel, at: Seconds) -> None:
         event = self._live.pop(cancel.id, None)
@@ -382,18 +450,22 @@ class Session:
         match signal.signal:
             case "ended":
                 self._ended_turns[signal.turn] = at
+                self._closes(signal.turn)
                 self._apply_to_addressees(
-                    signal.actor, at, lambda person: person.conversation.turn_ended(signal.turn, at)
+                    signal.actor,
+                    at,
+                    lambda person: person.talk.take(at, lambda talk: talk.turn_ended(signal.turn, at)),
                 )
             case "answered" | "repaired":
                 repairs = signal.signal == "repaired"
-                self._apply_to_addressees(
-                    signal.actor, at, lambda person: person.conversation.is_answered(at, repairs=repairs)
-                )
+                self.announce(request)
+                self._opens(signal.turn, signal.actor)
+                self._tell(signal.actor, at, lambda talk: talk.is_answered(at, repairs=repairs))
                 if request.block and request.block not in self.blocks.ended:
                     self._answering_blocks[request.block] = signal.actor
             case "aborted":
                 self._aborted_turns[signal.turn] = at
+                self._closes(signal.turn)
                 self._apply_to_addressees(signal.actor, at, lambda person: person.abort(at, turn=signal.turn))
         self._writer.effects.append(TurnOutcome(id=request.id, at=self._writer.stamp(at)))
 
@@ -403,6 +475,10 @@ class Session:
             self._people.apply_to_all(at, step)
         elif actor in self.persons:
             self._people.apply(actor, at, step)
+
+    def _tell(self, actor: str, at: Seconds, step: Step) -> None:
+        """Tell what happens to the conversation with a known person, or with all (actor: empty)."""
+        self._apply_to_addressees(actor, at, lambda person: person.talk.take(at, step))
 
     def _block_begins(self, block: str, at: Seconds) -> None:
         """Forget an earlier block of this id, and an earlier turn: a turn is called like the block that opens it."""
@@ -418,4 +494,4 @@ class Session:
         self._people.apply_to_all(at, lambda person: person.block_ended(block, at, aborted=aborted))
         answered = self._answering_blocks.pop(block, None)
         if answered is not None:
-            self._apply_to_addressees(answered, at, lambda person: person.conversation.pair.answered_block_ended(at))
+            self._tell(answered, at, lambda talk: talk.answered_block_ended(at))

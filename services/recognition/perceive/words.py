@@ -32,6 +32,8 @@ class TimedWords(Struct, frozen=True, kw_only=True):
     ended: Seconds
     final: bool = True
     confidence: Probability = 1.0
+    to: frozenset[str] | None = None
+    """Addressees, if perception knows them."""
 
     @property
     def is_line(self) -> bool:
@@ -115,7 +117,9 @@ class Words:
         person = self._people.get(words.actor) or _Person()
         known = person.utterances.get(words.id)
         text = " ".join(words.text.split())
-        if not words.final or (known is not None and at <= known.at):
+        if not words.final:
+            return self._told_early(person, words)
+        if known is not None and at <= known.at:
             return None
         speech = person.speech_with(words) if known is None else known.speech
         is_alone = speech is None
@@ -128,8 +132,13 @@ class Words:
         person.utterances[words.id] = _Known(at, words.began, text, speech)
         return Worded(
             actor=words.actor, since=speech, text=person.text_of(speech), is_alone=is_alone,
-            is_line=is_alone and words.is_line,
+            is_line=is_alone and words.is_line, to=words.to,
         )  # fmt: skip
+
+    def _told_early(self, person: _Person, words: TimedWords) -> Worded | None:
+        """Addressees that perception knows before it is sure of the words."""
+        speech = None if words.to is None else person.speech_with(words)
+        return None if speech is None else Worded(actor=words.actor, since=speech, text="", to=words.to)
 
     def speech(self, words: TimedWords) -> list[ActionBegan | ActionEnded]:
         """The speech that words without any are by themselves, as actions."""

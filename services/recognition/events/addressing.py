@@ -1,0 +1,131 @@
+"""To whom a person speaks. Pure.
+
+At a table with several people most of what is said is for somebody else: in recorded meetings of four two sentences
+of three. A robot that took all of it for its own would be asked things that nobody asked it, and its own questions
+would be answered by people who talk with each other. So each speech has addressees, and the rules that find them
+stand in one order, from what is certain to what is likely:
+
+1. perception says so (`Utterance.to`);
+2. the words call somebody who is here by name;
+3. there is nobody else: one person with the robot speaks to it; and so does who types a line;
+4. the gaze: whose face the speaker looks at for most of the speech. In groups of four, whom a speaker looks at is in
+   77 of 100 looks the addressee (Vertegaal and others, CHI 2001). People also look away while they think, so that no
+   look at a face says nothing;
+5. an answer goes to who has just spoken to the speaker;
+6. more words go to those to whom the words before went.
+
+If none of them finds anybody, it is not known, and nothing follows from it. The gaze is known when the speech is
+over, the words later still. Rules 1 to 3 decide as soon as they apply; the others at the end.
+"""
+
+from collections.abc import Collection, Iterable, Mapping
+
+from msgspec import Struct, field
+
+from engage_hri.schemas.units import Probability, Seconds
+
+JUST_SPOKEN: Seconds = 5.0
+"""Time after somebody's words in which what the other says is still about them. Ours."""
+SHORT_CALL = 3
+"""Number of words up to which a name at the end calls somebody. Ours."""
+Addressees = frozenset[str]
+NOBODY: Addressees = frozenset()
+EVERYBODY: Addressees = frozenset(("",))
+"""Of a speech of the robot of which nobody has said to whom it is."""
+
+
+class Spoken(Struct):
+    """A speech with known addressees. until: None: it goes on."""
+
+    actor: str
+    to: Addressees
+    since: Seconds
+    until: Seconds | None = None
+
+    def is_to(self, person: str) -> bool:
+        return person in self.to or self.to is EVERYBODY
+
+    def is_just_before(self, at: Seconds) -> bool:
+        """True if a speech that begins at `at` comes during this one, or soon after it."""
+        return self.since <= at and (self.until is None or at <= self.until + JUST_SPOKEN)
+
+
+class FaceTimes(Struct):
+    """Time for which a speaker has looked at each face since the speech began."""
+
+    at: Seconds
+    """Time up to which it is counted."""
+    face: str = ""
+    """Whose face the speaker looks at now; "": nobody's."""
+    looked: dict[str, Seconds] = field(default_factory=dict)
+
+    def turns(self, face: str, at: Seconds) -> None:
+        """Count the look until `at`; from then on it is at another face."""
+        if self.face and at > self.at:
+            self.looked[self.face] = self.looked.get(self.face, 0.0) + at - self.at
+        self.face, self.at = face, max(at, self.at)
+
+    def most(self, since: Seconds) -> str:
+        """The face that was looked at for more than half of the time from `since` to `at`; "": none."""
+        half = (self.at - since) / 2
+        return next((face for face, lasted in self.looked.items() if lasted > half), "")
+
+
+class OwnSpeech(Struct):
+    """A speech of a person, and what tells to whom it is."""
+
+    since: Seconds
+    confidence: Probability
+    faces: FaceTimes
+    until: Seconds | None = None
+    told: Addressees | None = None
+    """Addressees by perception."""
+    words: str = ""
+    to: Addressees | None = None
+    """Addressees; None: they are not known yet."""
+    spoken: Spoken | None = None
+    """The speech as the others remember it, once its addressees are known."""
+
+
+def named(words: str, names: Mapping[str, str]) -> Addressees:
+    """Those who are called by the words. names: actor ids by the names by which people call them.
+
+    A name calls somebody if it stands first, last after a comma, or last of a few words: "hello robot". In the
+    middle, and at the end of a sentence, it may be what the sentence is about.
+    """
+    said = words.split()
+    calls = said[:1]
+    if len(said) > 1 and (len(said) <= SHORT_CALL or said[-2].endswith(",")):
+        calls = [said[0], said[-1]]
+    plain = [word.strip(".,!?;:…").casefold() for word in calls]
+    return frozenset(names[each] for each in plain if each in names)
+
+
+def certain(
+    speech: OwnSpeech, company: Collection[str], robot: str, names: Mapping[str, str], *, is_line: bool
+) -> Addressees | None:
+    """Addressees by rules 1 to 3; None if these do not say.
+
+    company: other people who are here. is_line: it was typed, which one does to the robot.
+    """
+    if speech.told is not None:
+        return speech.told
+    if found := named(speech.words, names):
+        return found
+    return None if company and not is_line else frozenset((robot,))
+
+
+def likely(speech: OwnSpeech, speaker: str, spoken: Iterable[Spoken]) -> Addressees:
+    """Addressees by rules 4 to 6, once the speech is over, or so far. spoken: what was said before, by all."""
+    if face := speech.faces.most(speech.since):
+        return frozenset((face,))
+    recent = [each for each in spoken if each.is_just_before(speech.since) and each.since < speech.since]
+    asked = max((each for each in recent if each.is_to(speaker)), key=_since, default=None)
+    if asked is not None:
+        return frozenset((asked.actor,))
+    own = max((each for each in recent if each.actor == speaker), key=_since, default=None)
+    return NOBODY if own is None else own.to
+
+
+def _since(spoken: Spoken) -> Seconds:
+    return spoken.since

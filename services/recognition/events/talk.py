@@ -1,0 +1,211 @@
+"""What is said between one person and the robot, told to their `Conversation` once it is known to whom it is.
+
+With nobody else there all is known at once. In company it is known only at the end of a speech, or with its words,
+whether it is for the robot (`addressing`). What the robot says or asks meanwhile may be the answer to it. So from
+such a speech on everything waits in line, and is told in the order in which it happened, with its own times: what is
+known late has happened early.
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+
+from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.events.addressing import (
+    Addressees,
+    FaceTimes,
+    OwnSpeech,
+    Spoken,
+    certain,
+    likely,
+)
+from engage_hri.services.recognition.events.conversation import Conversation
+from engage_hri.services.recognition.events.machine import EventWriter
+from engage_hri.services.recognition.events.scene import SessionScene
+
+LONGEST_UNKNOWN: Seconds = 3.0
+"""Time after which it is decided to whom a speech is that still goes on, by the looks so far. Ours."""
+ADDRESSEES_WAIT: Seconds = 1.0
+"""Time after a speech for which perception is waited for that tells to whom people speak. Ours."""
+LONGEST_UNTOLD: Seconds = 10.0
+"""As `LONGEST_UNKNOWN`, where perception tells addressees: it may do so only with the words. Less than the time for
+which the realizer waits for the decision of a pair after its limit. Ours."""
+Step = Callable[[Conversation], object]
+
+
+class Talk:
+    """Talk of one person with the robot."""
+
+    def __init__(self, id: str, scene: SessionScene, config: RecognitionConfig, writer: EventWriter) -> None:
+        self.id = id
+        self._scene = scene
+        self._conversation = Conversation(id, scene, config, writer, robot_speaks=scene.robot_speaks_to(id))
+        self._line: deque[tuple[Seconds, Step | OwnSpeech]] = deque()
+        """What is not told yet, with its times. The first is a speech of which it is not known to whom it is."""
+        self._speech: OwnSpeech | None = None
+        """The speech of the person that goes on."""
+        self._faces = FaceTimes(0.0)
+
+    @property
+    def speaks_since(self) -> Seconds | None:
+        """Time when the person began what they say now; None: they are silent."""
+        return None if self._speech is None else self._speech.since
+
+    # -- time ---------------------------------------------------------------------------------------------------
+
+    @property
+    def deadlines(self) -> tuple[Seconds | None, ...]:
+        """Times of the `timed_steps`."""
+        return (self._decided_at,) if self._line else self._conversation.deadlines
+
+    @property
+    def timed_steps(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:
+        """Steps that are due by themselves, with their times."""
+        if self._line:
+            yield self._decided_at, self._decide
+        else:
+            yield from self._conversation.timed_steps
+
+    @property
+    def _decided_at(self) -> Seconds | None:
+        """Time at which it is decided to whom the first speech in line is."""
+        _, speech = self._line[0]
+        assert isinstance(speech, OwnSpeech)
+        longest = speech.since + (LONGEST_UNTOLD if self._scene.tells_addressees else LONGEST_UNKNOWN)
+        if speech.until is None:
+            return longest
+        return min(longest, speech.until + (ADDRESSEES_WAIT if self._scene.tells_addressees else 0.0))
+
+    # -- the person ---------------------------------------------------------------------------------------------
+
+    def looks_at(self, face: str, at: Seconds) -> None:
+        """Take a look at a face, or away from all ("")."""
+        for speech in self._unknown:
+            if speech.until is None:
+                speech.faces.turns(face, at)
+
+    def speaks(self, at: Seconds, confidence: Probability, face: str) -> None:
+        """Take the beginning of a speech. face: whose face the person looks at."""
+        self._speech = speech = OwnSpeech(at, confidence, FaceTimes(at, face))
+        speech.told = self._scene.told_addressees.get((self.id, at))
+        self._find(speech, face)
+        self._queue(at, speech)
+
+    def falls_silent(self, at: Seconds) -> None:
+        """Take the end of the speech that goes on."""
+        speech, self._speech = self._speech, None
+        if speech is None:
+            return
+        speech.until = at
+        speech.faces.turns("", at)
+        if speech.spoken is not None:
+            speech.spoken.until = at
+        self.take(at, lambda talk: talk.falls_silent(at) if self._scene.robot in (speech.to or ()) else None)
+        if self._line and self._decided_at == at:
+            self._decide(at)
+
+    def shows(self, at: Seconds, face: str, step: Step) -> None:
+        """Take a sign without words, which is to the robot unless the person looks at somebody else's face.
+
+        Of who looks at nobody's it is to the robot if that has just spoken to the person.
+        """
+        is_asked = self._conversation.is_spoken_to
+        if not self._scene.company(self.id) or face == self._scene.robot or (not face and is_asked):
+            self.take(at, step)
+
+    def goes_on(self, action: Action, since: Seconds, at: Seconds, confidence: Probability, face: str) -> None:
+        """Take an action that goes on, known only now, at `at`. It has been decided by the looks of now to whom."""
+        if action == "speak":
+            self._speech = speech = OwnSpeech(since, confidence, FaceTimes(since, face))
+            if not self._find(speech, face):
+                speech.faces.turns(face, at)
+                self._address(speech, likely(speech, self.id, self._scene.spoken))
+            if self._scene.robot not in (speech.to or ()):
+                return
+        self.take(at, lambda talk: talk.goes_on(action, since, confidence))
+
+    def understand(self, since: Seconds, words: str, told: Addressees | None, at: Seconds) -> None:
+        """Take the words of a speech. told: addressees, if perception knows them."""
+        for speech in self._unknown:
+            if speech.since == since:
+                speech.words, speech.told = words or speech.words, told or speech.told
+                self._find(speech, "")
+        self.take(at, lambda talk: talk.understand(since))
+        self._go_on(at)
+
+    def person_gone(self, at: Seconds, until: Seconds) -> None:
+        """Take the person's leaving: nothing waits any longer."""
+        if self._speech is not None and self._speech.until is None:
+            self._speech.until = until
+        self._speech = None
+        while self._line:
+            self._decide(at)
+        self._conversation.person_gone(at, until)
+
+    def person_back(self) -> None:
+        """Take the person's return: the robot may be speaking, or may have fallen silent meanwhile."""
+        self._conversation.robot_speaks_now = self._scene.robot_speaks_to(self.id)
+
+    # -- the line -----------------------------------------------------------------------------------------------
+
+    def take(self, at: Seconds, step: Step) -> None:
+        """Take what happens at `at` to the conversation: now, or in its turn."""
+        if self._line:
+            self._line.append((at, step))
+        else:
+            step(self._conversation)
+
+    @property
+    def _unknown(self) -> list[OwnSpeech]:
+        return [each for _, each in self._line if isinstance(each, OwnSpeech) and each.to is None]
+
+    def _find(self, speech: OwnSpeech, face: str) -> bool:
+        """Decide to whom the speech is if that is certain. face: whose face the person looks at."""
+        company = self._scene.company(self.id)
+        is_line = self._scene.lines.get(self.id) == speech.since
+        to = certain(speech, company, self._scene.robot, self._scene.names, is_line=is_line)
+        if to is None and face == self._scene.robot and not self._line and self._conversation.is_spoken_to:
+            to = frozenset((face,))  # who has been asked, and looks at who has asked, answers
+        if to is not None:
+            self._address(speech, to)
+        return to is not None
+
+    def _address(self, speech: OwnSpeech, to: Addressees) -> None:
+        speech.to = to
+        speech.spoken = Spoken(self.id, to, speech.since, speech.until)
+        self._scene.note_spoken(speech.spoken)
+
+    def _queue(self, at: Seconds, speech: OwnSpeech) -> None:
+        if self._line or speech.to is None:
+            self._line.append((at, speech))
+        elif self._scene.robot in speech.to:
+            self._conversation.speaks(at, speech.confidence)
+
+    def _decide(self, at: Seconds) -> None:
+        """Decide to whom the first speech in line is, by what is likely."""
+        _, speech = self._line[0]
+        assert isinstance(speech, OwnSpeech)
+        speech.faces.turns(speech.faces.face, at)
+        self._address(speech, likely(speech, self.id, self._scene.spoken))
+        self._go_on(at)
+
+    def _go_on(self, now: Seconds) -> None:
+        """Tell all in line up to the next speech of which it is not known to whom it is."""
+        while self._line:
+            at, item = self._line[0]
+            if isinstance(item, OwnSpeech) and item.to is None:
+                if self._decided_at is not None and self._decided_at <= now:
+                    self._decide(now)
+                return
+            self._line.popleft()
+            self._catch_up(at)
+            if not isinstance(item, OwnSpeech):
+                item(self._conversation)
+            elif self._scene.robot in (item.to or ()):
+                self._conversation.speaks(at, item.confidence)
+
+    def _catch_up(self, until: Seconds) -> None:
+        """Take the steps of the conversation that were due before `until`."""
+        while (due := min((at for at in self._conversation.deadlines if at is not None), default=until)) < until:
+            next(step for at, step in self._conversation.timed_steps if at == due)(due)
