@@ -58,6 +58,8 @@ class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event",
     response: Action | None = None
     """Adjacency pair: the action that answered. Of a failed one: the answer that came after the limit, before anybody
     began another turn; `delay` is then that of this answer."""
+    answered_by: str = ""
+    """Adjacency pair of the robot that was `preempted`: the person who answered in the responder's place."""
     confidence: Probability = 1.0
     """Least confidence of the observations by which it began and was answered; so far, when `started`."""
     block: str = ""

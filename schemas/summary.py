@@ -139,7 +139,7 @@ def summary(*outcomes: FragmentOutcome) -> Summary:
         eye_contact=next((each.eye_contact for each in reversed(outcomes) if each.eye_contact is not None), None),
         answer=_answer(pair, is_over=status != "done"),
         answer_delay=_rounded(pair.delay) if pair and pair.response else None,
-        answered_by=pair.responder if pair and pair.response else "",
+        answered_by=(pair.answered_by or pair.responder) if pair and pair.response else "",
         heard=_heard(text for outcome in outcomes for text in outcome.heard),
         problems=_problems(wrong),
     )

@@ -15,6 +15,7 @@ from engage_hri.services.recognition.events.machine import (
     TransitionRow,
     table,
 )
+from engage_hri.services.recognition.events.scene import Question
 
 ROBOT_WAITING, HUMAN_WAITING = "robot_waiting", "human_waiting"
 INTERRUPTED, RESPONDING = "interrupted", "responding"
@@ -26,6 +27,7 @@ TABLE = table(
     TransitionRow(ROBOT_WAITING, "turn_ends", ROBOT_WAITING),
     TransitionRow(ROBOT_WAITING, "responder_interrupts", INTERRUPTED),
     TransitionRow(ROBOT_WAITING, "human_answers", RESPONDING, ("succeeded",)),
+    TransitionRow(ROBOT_WAITING, "other_answers", IDLE, ("preempted",)),
     TransitionRow(ROBOT_WAITING, "repaired", IDLE, ("succeeded", "completed")),
     TransitionRow(ROBOT_WAITING, "limit", IDLE, ("failed",)),
     TransitionRow(ROBOT_WAITING, "withdraw", IDLE, ("withdrawn",)),
@@ -176,6 +178,20 @@ class AdjacencyPair(Machine):
             self.turn_ends(at)
         elif self.state == ROBOT_WAITING:
             self.step("withdraw", at)
+
+    @property
+    def question(self) -> Question | None:
+        """The robot's question that waits for an answer, its turn being over; None: none does."""
+        if self.state != ROBOT_WAITING or self._turn_end is None or self.event is None or self.deadline is None:
+            return None
+        return Question(self.event.accept, self._turn_end, self.deadline)
+
+    def other_answers(self, person: str, action: Action, at: Seconds) -> None:
+        """Take the answer of somebody who was not asked: it is no failure of who was."""
+        if self.event is not None and self.question is not None:
+            self.event.response, self.event.answered_by = action, person
+            self.event.delay = at - self.question.since
+            self.step("other_answers", at)
 
     # -- second turn --------------------------------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ from engage_hri.services.recognition.events.adjacency_pair import AdjacencyPair
 from engage_hri.services.recognition.events.backchannel import BRIEF, UNDECIDED, Backchannel
 from engage_hri.services.recognition.events.limits import in_time
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent
-from engage_hri.services.recognition.events.scene import SessionScene
+from engage_hri.services.recognition.events.scene import Question, SessionScene
 from engage_hri.services.text.listening import is_listening
 
 TURN_PATIENCE: Seconds = 12.0
@@ -198,6 +198,8 @@ class Conversation:
             pass
         elif action == "speak" and pair.is_third_turn(self.id, at):
             pair.third_turn(at)
+        elif self._scene.answers_for_another(self.id, action, at):
+            pass
         elif pair.state == IDLE:
             event = OngoingEvent(
                 kind="adjacency_pair", initiator=self.id, responder=self._scene.robot, started=at,
@@ -318,6 +320,13 @@ class Conversation:
         if announced is not None and announced.block == block:
             self.robot_backchannel.ends(at)
         self._floor_is_free(at)
+
+    @property
+    def question(self) -> Question | None:
+        return self.pair.question
+
+    def other_answers(self, person: str, action: Action, at: Seconds) -> None:
+        self.pair.other_answers(person, action, at)
 
     def answered_block_ended(self, at: Seconds) -> None:
         self.pair.answered_block_ended(at)

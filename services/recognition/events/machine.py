@@ -91,6 +91,7 @@ class OngoingEvent(Struct, kw_only=True):
     delay: Seconds | None = None
     duration: Seconds | None = None
     response: Action | None = None
+    answered_by: str = ""
     confidence: Probability = 1.0
     """Least confidence of the observations on which the event rests."""
     changed: Seconds | None = None
@@ -147,9 +148,9 @@ class EventWriter:
                 at=self.stamp(at), started=self.stamp(event.started), objects=event.objects, cause=event.cause,
                 optional=event.optional, delay=None if begins else event.delay,
                 duration=event.duration if ends else None, limit=event.limit if begins else None,
-                response=None if begins else event.response, confidence=event.confidence,
-                block=event.block, behavior=event.behavior, turn=event.turn, words=self._words_of(event),
-                retold=retold,
+                response=None if begins else event.response, answered_by=event.answered_by,
+                confidence=event.confidence, block=event.block, behavior=event.behavior, turn=event.turn,
+                words=self._words_of(event), retold=retold,
         )  # fmt: skip
         self.effects.append(told)
         if event.spoken:

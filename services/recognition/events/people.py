@@ -5,13 +5,14 @@ while, in case they come back.
 """
 
 from collections.abc import Callable
+from functools import partial
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import EventWriter, Mishap, PersonForgotten
 from engage_hri.services.recognition.events.person import PersonRecognition
-from engage_hri.services.recognition.events.scene import SessionScene
+from engage_hri.services.recognition.events.scene import SessionScene, TakenUp
 from engage_hri.services.requests.deadlines import Deadlines
 from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
 
@@ -116,6 +117,7 @@ class People:
     def apply(self, id: str, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
         """Apply a step to one person."""
         self._apply(self.persons[id], at, step)
+        self._follow_answers(at)
         self._follow_speech(at)
 
     def apply_to_all(self, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
@@ -123,7 +125,15 @@ class People:
         self._speech = self._scene.speech
         for person in list(self._here.values()):
             self._apply(person, at, step)
+        self._follow_answers(at)
         self._follow_speech(at)
+
+    def _follow_answers(self, at: Seconds) -> None:
+        """Tell those who were asked that somebody else has answered in their place."""
+        while self._scene.taken_up:
+            taken_up = self._scene.taken_up.pop()
+            if taken_up.asked in self.persons:
+                self._apply(self.persons[taken_up.asked], at, partial(_answered_by_other, taken_up))
 
     def _follow_speech(self, at: Seconds) -> None:
         """Update all deadlines if speech has begun or ended: while one speaks, looks of the others direct nothing."""
@@ -142,7 +152,11 @@ class People:
             self.lose_track(person, at)
 
     def _update(self, person: PersonRecognition) -> None:
-        """Note when the person is due, and whether it is here."""
+        """Note when the person is due, whether the robot waits for its answer, and whether it is here."""
+        if (question := person.talk.question) is not None:
+            self._scene.questions[person.id] = question
+        else:
+            self._scene.questions.pop(person.id, None)
         self._agenda.set(person.id, person.deadline)
         here, was_here = person.presence.here, person.id in self._here
         (self._scene.found.add if here and person.presence.reported else self._scene.found.discard)(person.id)
@@ -155,3 +169,9 @@ class People:
             self._scene.present.add(person.id)
             person.talk.person_back()
             self._here = dict(sorted(self._here.items(), key=lambda one: one[1].number))
+
+
+def _answered_by_other(taken_up: TakenUp, asked: PersonRecognition) -> None:
+    """Tell the person who was asked that somebody else has answered."""
+    _, by, action, at = taken_up
+    asked.talk.take(at, lambda talk: talk.other_answers(by, action, at))

@@ -5,12 +5,13 @@ from typing import NamedTuple
 from msgspec import Struct
 
 from engage_hri.schemas.attention import Claim
+from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import GazeResolution
 from engage_hri.services.recognition.events.addressing import Addressees, Spoken
 from engage_hri.services.recognition.events.history import Latest
-from engage_hri.services.recognition.events.limits import BLOCKS_KEPT
+from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, in_time
 
 LINES_KEPT = 256
 SPOKEN_KEPT = 32
@@ -46,6 +47,23 @@ class Worded(Struct, frozen=True, kw_only=True):
     is_line: bool = False
     to: Addressees | None = None
     """Addressees, if perception knows them."""
+
+
+class Question(NamedTuple):
+    """A question of the robot that waits. since: end of its turn. until: time by which an answer has to begin."""
+
+    accept: tuple[Action, ...]
+    since: Seconds
+    until: Seconds
+
+
+class TakenUp(NamedTuple):
+    """Somebody has answered the robot in another's place. asked: who was asked."""
+
+    asked: str
+    person: str
+    action: Action
+    at: Seconds
 
 
 class GazeState(Struct):
@@ -120,6 +138,10 @@ class SessionScene:
         """To whom a speech is by perception, by speaker and start, if that is told before the speech."""
         self.spoken: list[Spoken] = []
         """The latest speeches whose addressees are known, of all."""
+        self.questions: dict[str, Question] = {}
+        """Questions of the robot that wait for an answer, by the person who was asked."""
+        self.taken_up: list[TakenUp] = []
+        """Answers to them by somebody else, which the person who was asked has yet to be told of."""
         self.listening_blocks: Latest[str, None] = Latest(BLOCKS_KEPT)
         """Blocks under way that the robot has announced as backchannels: they answer nobody."""
         self.speech = 0
@@ -165,6 +187,23 @@ class SessionScene:
     def robot_speaks_to(self, person: str) -> bool:
         """True while the robot speaks to this person, or to nobody known."""
         return self.robot_spoken is not None and self.robot_spoken.is_to(person)
+
+    def answers_for_another(self, person: str, action: Action, at: Seconds) -> bool:
+        """Take what a person says to the robot as the answer to a question that the robot has asked somebody else.
+
+        False if it is none: no such question waits. Of several the latest is answered.
+        """
+        waiting = [
+            (question.since, asked)
+            for asked, question in self.questions.items()
+            if asked != person and action in question.accept and question.since <= at and in_time(at, question.until)
+        ]
+        if not waiting:
+            return False
+        asked = max(waiting)[1]
+        del self.questions[asked]
+        self.taken_up.append(TakenUp(asked, person, action, at))
+        return True
 
     def robot_falls_silent(self, at: Seconds) -> None:
         if self.robot_spoken is not None:

@@ -22,7 +22,7 @@ from engage_hri.services.recognition.events.addressing import (
 )
 from engage_hri.services.recognition.events.conversation import Conversation
 from engage_hri.services.recognition.events.machine import EventWriter
-from engage_hri.services.recognition.events.scene import SessionScene
+from engage_hri.services.recognition.events.scene import Question, SessionScene
 
 LONGEST_UNKNOWN: Seconds = 3.0
 """Time after which it is decided to whom a speech is that still goes on, by the looks so far. Ours."""
@@ -51,6 +51,11 @@ class Talk:
     def speaks_since(self) -> Seconds | None:
         """Time when the person began what they say now; None: they are silent."""
         return None if self._speech is None else self._speech.since
+
+    @property
+    def question(self) -> Question | None:
+        """The robot's question that waits for the person's answer; None: none does, or that is not known yet."""
+        return None if self._line else self._conversation.question
 
     # -- time ---------------------------------------------------------------------------------------------------
 

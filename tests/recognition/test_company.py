@@ -1,0 +1,171 @@
+"""Several people: only what is said to the robot opens or answers its pairs; its words answer whom they are for."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from engage_hri.schemas.behaviors import TurnSignal
+from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
+from engage_hri.services.recognition.events.scene import Worded
+from tests.recognition.observations import ROBOT, Log, request_event, stamp
+from tests.stories import Story, each
+
+STORIES = """
+two who talk with each other tell the robot nothing
+    1 ann looks bob; 1 bob looks ann; 1.5 ann speaks 2; 3.8 bob speaks 1; 5 ann speaks 1; 20 end
+    nothing
+
+who looks at the robot speaks to it
+    1 ann looks robot; 1.5 ann speaks 2; 20 end
+    ann: started 1.5, failed 7.5
+
+what perception says counts before the looks
+    1 ann looks bob; 1.5 ann speaks 2 to=robot; 20 end
+    ann: started 1.5, failed 7.5
+
+... also if it tells of somebody else
+    1 ann looks robot; 1.5 ann speaks 2 to=bob; 20 end
+    nothing
+
+... and if it tells it only with the words
+    0.1 ann speaks 0.2 to=bob; 1 ann looks robot; 1.5 ann speaks 2; 4.2 ann said 1.5 to=bob; 20 end
+    nothing
+
+most of the look counts
+    1 ann looks robot; 1.5 ann speaks 2; 1.9 ann looks bob; 20 end
+    nothing
+
+the robot's name calls it
+    1 ann looks bob; 1.5 ann speaks 2; 2.5 ann said 1.5 words=hello,robot; 20 end
+    ann: started 1.5, failed 7.5
+
+who thinks looks at nobody, and answers who has asked
+    1 robot asks ann 2; 3.6 ann speaks 1; 20 end
+    robot: started 1, succeeded 3.6 after 0.6, completed 4.6
+
+an answer to another is none
+    1 robot asks ann 2; 2 ann looks bob; 3.6 ann speaks 1; 20 end
+    robot: started 1, failed 7
+
+who looks at the robot while it waits has answered at once
+    1 robot asks ann 2; 2 ann looks robot; 3.6 ann speaks 9; 4 known
+    robot: started 1, succeeded 3.6 after 0.6
+
+somebody else answers
+    1 robot asks ann 2; 2 bob looks robot; 3.6 bob speaks 1; 20 end
+    robot: started 1, preempted 3.6 after 0.6 by bob
+
+somebody else talks with somebody else
+    1 robot asks ann 2; 2 bob looks ann; 3.6 bob speaks 1; 20 end
+    robot: started 1, failed 7
+
+the robot's words to another answer nobody else
+    1 ann looks robot; 1.5 ann speaks 1; 3 robot asks bob 2; 20 end
+    ann: started 1.5, failed 6.5
+    robot: started 3, failed 9
+
+... and its words to her do
+    1 ann looks robot; 1.5 ann speaks 1; 3 robot asks ann 2; 20 end
+    ann: started 1.5, succeeded 3 after 0.5, completed 3
+    robot: started 3, failed 9
+
+two talk while the robot speaks to a third
+    1 ann looks bob; 1 bob looks ann; 2 robot asks cy 4; 2.5 ann speaks 1; 3.7 bob speaks 1; 20 end
+    robot: started 2, failed 10
+
+one asks another, who answers, and the robot speaks
+    1 ann looks bob; 1 bob looks ann; 2 ann speaks 1; 3.2 bob speaks 1; 4.4 robot asks ann 1; 20 end
+    robot: started 4.4, failed 9.4
+
+a side participant nods
+    1 robot asks ann 3; 1 bob looks robot; 2 bob nods 0.4; 20 end
+    robot: started 1, failed 8
+
+the addressee nods
+    1 robot asks ann 3; 1 ann looks robot; 2 ann nods 0.4; 20 end
+    robot: started 1, failed 8
+    robot bc: started 2, succeeded 2, completed 2.4
+
+a nod at another is not for the robot
+    1 robot asks ann 1; 1 ann looks bob; 2.5 ann nods 0.4; 20 end
+    robot: started 1, failed 6
+
+what the robot asks while it is not known to whom she speaks is told in its turn
+    1 ann speaks 2; 2 robot asks ann 1; 2.5 ann looks bob; 20 end
+    robot: started 2, failed 7
+
+a typed line is for the robot
+    1 ann looks bob; 2 ann types hello; 20 end
+    ann: started 2, failed 6
+"""
+
+
+@each(STORIES)
+def test_several_people(story: Story) -> None:
+    log = Log("ann", "bob", "cy", adjacency_pair_limit=4.0)
+    *steps, last = story.steps
+    over, what = last.split()
+    for at, _, feed in sorted(_spelled_out(log, steps), key=lambda each: each[:2]):
+        if what == "known" and at > float(over):
+            break
+        log.until(at - 1e-6)
+        feed()
+    log.until(float(over) if what == "known" else 100.0)
+
+    assert (_lives(log.events) or ["nothing"]) == story.becomes
+
+
+def _spelled_out(log: Log, steps: list[str]) -> Iterable[tuple[float, int, Any]]:
+    for number, step in enumerate(steps):
+        time, who, *words = step.split()
+        at = float(time)
+        plain = [word for word in words if "=" not in word]
+        named = dict(word.split("=") for word in words if "=" in word)
+        match plain:
+            case ["looks", target]:
+                yield at, number, lambda at=at, who=who, target=target: log.looks(who, target, at)
+            case ["speaks" | "nods" as action, lasts]:
+                action = "speak" if action == "speaks" else "nod"
+                end = at + float(lasts)
+                if "to" in named:
+                    to = frozenset((named["to"],))
+                    told = Worded(actor=who, since=at, text="", to=to)
+                    yield at, number, lambda told=told, at=at: log.feed(told, at)
+                yield at, number, lambda at=at, who=who, a=action: log.begins(who, a, at)
+                yield end, number, lambda end=end, who=who, a=action: log.ends(who, a, end)
+            case ["types", text]:
+                line = Worded(actor=who, since=at, text=text, is_alone=True, is_line=True)
+                yield at, number, lambda line=line, at=at: log.feed(line, at)
+                yield at, number, lambda at=at, who=who: log.begins(who, "speak", at)
+                yield at, number, lambda at=at, who=who: log.ends(who, "speak", at)
+            case ["said", since]:
+                to = frozenset((named["to"],)) if "to" in named else None
+                worded = Worded(actor=who, since=float(since), text=named.get("words", "so").replace(",", " "), to=to)
+                yield at, number, lambda worded=worded, at=at: log.feed(worded, at)
+            case ["asks", person, lasts]:
+                end, block = at + float(lasts), f"block-{number}"
+                yield (
+                    at,
+                    number,
+                    lambda at=at, b=block, p=person: log.feed(
+                        request_event("adjacency_pair", at, request=b, block=b, turn=b, responder=p), at
+                    ),
+                )
+                yield at, number, lambda at=at, b=block: log.begins(ROBOT, "speak", at, behavior=f"{b}:s")
+                yield end, number, lambda end=end, b=block: log.ends(ROBOT, "speak", end, behavior=f"{b}:s")
+                signal = TurnSignal(id="e", turn=block, signal="ended", actor=person)
+                ended = SignalTurn(id=f"{block}/e", requester="realizer", signal=signal, at=stamp(end), block=block)
+                yield end, number, lambda ended=ended, end=end: log.feed(ended, end)
+
+
+def _lives(events: list[ConnectionEvent]) -> list[str]:
+    lines: dict[str, str] = {}
+    for event in events:
+        if event.kind not in ("adjacency_pair", "backchannel"):
+            continue
+        line = lines.get(event.id, f"{event.initiator}{' bc' if event.kind == 'backchannel' else ''}:")
+        after = (
+            f" after {event.delay:g}" if event.state in ("succeeded", "preempted") and event.delay is not None else ""
+        )
+        by = f" by {event.answered_by}" if event.answered_by else ""
+        lines[event.id] = f"{line} {event.state} {round(event.at.seconds, 6):g}{after}{by},"
+    return [line.rstrip(",") for line in lines.values()]
