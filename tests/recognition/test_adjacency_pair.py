@@ -39,7 +39,7 @@ short speech that outlasts the turn is the answer
 pauses between the robot's words belong to its turn
     1 asking; 1.5 robot -speak words; 1.7 human +nod; 1.9 human -nod
     robot's ap-1: started 1
-    robot's bc-1: started 1.7, succeeded 1.7, completed 1.9 lasting 0.2
+    robot's bc-1: started 1.9 since 1.7, succeeded 1.9, completed 1.9 lasting 0.2
 
 manipulation during the turn answers early
     1 asking act; 1.5 human +act blue; 2 turn ended

@@ -16,8 +16,8 @@ longer speech while the robot speaks is a change of floor
 gestures while the robot speaks are backchannels
     ACTION in nod shake
     1 robot +speak; 1.5 human +ACTION; 2.5 human +ACTION; 3 human -ACTION
-    robot's bc-1: started 1.5, succeeded 1.5, completed 2.5 lasting 1
-    robot's bc-2: started 2.5, succeeded 2.5, completed 3 lasting 0.5
+    robot's bc-1: started 2.5 since 1.5, succeeded 2.5, completed 2.5 lasting 1
+    robot's bc-2: started 3 since 2.5, succeeded 3, completed 3 lasting 0.5
 
 a nod into silence is nothing
     1 human +nod; 1.5 human -nod
@@ -59,7 +59,7 @@ an announced backchannel ends with its block
 
 a gesture whose person vanishes is completed
     1 robot +speak; 1.5 human +nod; 1.6 lost human; 3.6 time
-    robot's bc-1: started 1.5, succeeded 1.5, completed 3.6 lasting 0.1
+    robot's bc-1: started 1.6 since 1.5 told 3.6, succeeded 1.6 told 3.6, completed 1.6 lasting 0.1 told 3.6
 
 late and repeated speech does not speak for ever
     1 human +speak; 2 human -speak; 1 human +speak; 3.5 time

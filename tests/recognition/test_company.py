@@ -83,7 +83,7 @@ a side participant nods
 the addressee nods
     1 robot asks ann 3; 1 ann looks robot; 2 ann nods 0.4; 20 end
     robot: started 1, failed 8
-    robot bc: started 2, succeeded 2, completed 2.4
+    robot bc: started 2.4, succeeded 2.4, completed 2.4
 
 a nod at another is not for the robot
     1 robot asks ann 1; 1 ann looks bob; 2.5 ann nods 0.4; 20 end

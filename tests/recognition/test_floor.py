@@ -32,7 +32,7 @@ a nod beside an uh-huh is no answer
     1 asking; 1.5 human +speak; 1.55 human +nod; 1.9 human -speak; 2.1 human -nod; 3 robot -speak words
     3 turn ended
     robot's ap-1: started 1
-    robot's bc-1: started 1.9 since 1.5, succeeded 1.9, completed 1.9 lasting 0.4
+    robot's bc-1: started 2.1 since 1.5, succeeded 2.1, completed 2.1 lasting 0.6
 
 speech over the last word comes before a nod that began later
     1 asking; 2.8 human +speak; 2.9 human +nod; 3 robot -speak words; 3 turn ended; 4 human -speak

@@ -100,13 +100,13 @@ def test_at_the_limit_is_in_time_and_beyond_it_is_not():
     assert not in_time(2.2001, 0.3 + 1.9)
 
 
-def test_of_two_answers_that_began_at_one_instant_the_one_known_first_counts():
+def test_of_two_answers_that_began_at_one_instant_the_one_observed_first_counts():
     log = asked(end=None)
     log.begins(HUMAN, "speak", 1.5)
     log.begins(HUMAN, "point", 1.5, BLUE)
     log.signals("ended", 4.0)
 
-    assert log.succeeded("ap-1").response == "point"
+    assert log.succeeded("ap-1").response == "speak"
 
 
 def test_two_points_at_one_instant_direct_both():

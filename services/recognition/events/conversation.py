@@ -11,6 +11,7 @@ from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.adjacency_pair import AdjacencyPair
 from engage_hri.services.recognition.events.backchannel import BRIEF, UNDECIDED, Backchannel
 from engage_hri.services.recognition.events.limits import in_time
+from engage_hri.services.recognition.events.listener_sign import ListenerSign, Part
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import Question, SessionScene
 from engage_hri.services.text.listening import is_listening
@@ -40,6 +41,8 @@ class Conversation:
         self.robot_speaks_now = robot_speaks
         """True while the robot speaks to this person."""
         self._speech_confidence: Probability = 1.0
+        self._sign: ListenerSign | None = None
+        """What the person does in the robot's turn, as long as it is not decided what it is."""
         self._brief: tuple[Seconds, Seconds | None] | None = None
         """Beginning and end of the person's last speech within the robot's turn, if it has been no answer so far."""
         self._scene = scene
@@ -56,27 +59,28 @@ class Conversation:
     @property
     def deadlines(self) -> tuple[Seconds | None, ...]:
         """Times of the `timed_steps`."""
-        return self.own_backchannel.deadline, self.robot_backchannel.deadline, self._pair_deadline
+        return self._sign_deadline, self.robot_backchannel.deadline, self._pair_deadline
 
     @property
     def timed_steps(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:
         """Steps that are due by themselves, with their times."""
-        yield self.own_backchannel.deadline, self._takes_floor
+        yield self._sign_deadline, self._sign_is_due
         yield self.robot_backchannel.deadline, self._robot_takes_floor
         yield self._pair_deadline, self.pair.expire
 
     @property
     def _pair_deadline(self) -> Seconds | None:
         """Deadline of the pair; None while speech that began in time may yet turn out to be the answer."""
-        at, since = self.pair.deadline, self.own_backchannel.undecided_since
-        if at is not None and since is not None and in_time(since, at) and self.pair.may_be_answered_with("speak"):
-            return None
-        return at
+        at, speeches = self.pair.deadline, self._sign.speeches if self._sign is not None else []
+        began_in_time = at is not None and any(in_time(speech.since, at) for speech in speeches)
+        return None if began_in_time and self.pair.may_be_answered_with("speak") else at
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         for pair in self._pairs():
             pair.person_gone(at, until)
-        self.own_backchannel.person_gone(at, until)
+        if self._sign is not None and not self._sign.speeches:
+            self._was_backchannel(self._sign, until)
+        self._sign = None
         self.robot_backchannel.person_gone(at, until)
         self.speaks_since = self.acts_since = None
         self.silent_since = until
@@ -103,10 +107,7 @@ class Conversation:
         self._speech_confidence = confidence
         # A line that was typed has no length by which it could be judged: who sends one has something to say.
         if self.robot_holds_floor and self._scene.lines.get(self.id) != at:
-            event = self._backchannel(self._scene.robot, self.id, at, confidence)
-            event.spoken = (at,)
-            self._brief = None
-            self.own_backchannel.speaks(event)
+            self._signs("speak", at, confidence)
         else:
             self._human_turn(at, "speak", confidence)
 
@@ -114,31 +115,102 @@ class Conversation:
         if self.speaks_since is None:
             return
         self.speaks_since, self.silent_since = None, at
-        since = self.own_backchannel.undecided_since
-        if since is not None:
-            if self._listens(since) is False:
-                self._takes_floor(at, "words")
-            else:
-                self._brief = since, at
-        self._backchannel_speech_ends(self.own_backchannel, at)
-        self._floor_is_free(at)
         self._ends("speak", at, by_robot=False)
+        self._floor_is_free(at)
+
+    def gestures(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> None:
+        """Take a nod, a shake or a point of the person."""
+        if self.robot_holds_floor:
+            self._signs(action, at, confidence)
+        else:
+            self.pair.human_begins(action, at, confidence)
+
+    def gesture_ends(self, action: Action, at: Seconds) -> None:
+        self._ends(action, at, by_robot=False)
+
+    # -- signs in the robot's turn ------------------------------------------------------------------------------
+
+    def _signs(self, action: Action, at: Seconds, confidence: Probability) -> None:
+        if self._sign is not None and self._sign.until is not None:
+            self._was_backchannel(self._sign, self._sign.until)  # its words have not come until the next one begins
+        if self._sign is None:
+            self._sign = ListenerSign([])
+        self._sign.parts.append(Part(action, at, confidence))
+
+    @property
+    def _sign_deadline(self) -> Seconds | None:
+        sign = self._sign
+        if sign is None or (sign.speeches and self._listens(sign.speeches[-1].since)):
+            return None
+        return sign.deadline(self._config.backchannel_limit)
+
+    def _sign_is_due(self, at: Seconds) -> None:
+        """Decide the sign: its speech has become too long for a backchannel, or its words have not come."""
+        assert self._sign is not None
+        if speech := self._sign.going_on("speak"):
+            self._answers(speech[0])
+        else:
+            self._sign.is_wordless = True
+            self._judge()
+
+    def _judge(self) -> None:
+        """Decide the sign, if what is known leaves one reading of it."""
+        sign = self._sign
+        if sign is None:
+            return
+        heard = [(self._listens(speech.since), speech) for speech in sign.speeches]
+        interrupts = next((speech for listens, speech in heard if listens is False), None)
+        may_be_known = self.pair.robot_holds_turn and self.id in self._scene.worded and not sign.is_wordless
+        is_known = not may_be_known or all(listens for listens, _ in heard)
+        if interrupts is not None:
+            self._answers(interrupts)
+        elif sign.until is not None and is_known:
+            self._was_backchannel(sign, sign.until)
+
+    def _was_backchannel(self, sign: ListenerSign, until: Seconds) -> None:
+        self._sign = None
+        if all(part.action == "point" for part in sign.parts):
+            return  # a point in the robot's turn directs the gaze, and says nothing
+        event = self._backchannel(self._scene.robot, self.id, sign.since, sign.confidence)
+        if sign.speeches:
+            event.spoken = tuple(speech.since for speech in sign.speeches)
+            self._brief = sign.speeches[-1].since, sign.speeches[-1].until
+        self.own_backchannel.speaks(event)
+        self.own_backchannel.ends(until)
+
+    def _answers(self, part: Part) -> None:
+        """Take a part of the sign as a turn of the person since it began."""
+        self._sign = None
+        if part.action == "speak":
+            self._human_turn(part.since, "speak", part.confidence)
+            self.understand(part.since)
+        elif self.pair.human_begins(part.action, part.since, part.confidence) and part.until is not None:
+            self.pair.ends(part.action, part.until, by_robot=False)
+
+    def _keep_floor(self) -> None:
+        """Take what goes on of a sign for the answer, because the robot's turn is over.
+
+        Of several parts it is the one that began first. A gesture that answers nothing here stays what it is.
+        """
+        for part in self._sign.going_on() if self._sign is not None else ():
+            if part.action == "speak" or self.pair.may_be_answered_with(part.action):
+                self._answers(part)
+                return
 
     def understand(self, since: Seconds) -> None:
-        """Judge speech within the robot's turn by its words, if they are known before the turn is over.
+        """Judge speech in the robot's turn by its words, if they are known before the turn is over.
 
-        Until then its length has decided: a "stop" was too short for an answer, and "yes, yes, okay" too long for a
-        backchannel.
+        They may come when its length has already decided: a "stop" was too short for an answer, and "yes, yes, okay"
+        too long for a backchannel.
         """
+        if self._sign is not None and any(speech.since == since for speech in self._sign.speeches):
+            self._judge()
+            return
         pair, listens = self.pair, self._listens(since)
         if listens:
             if pair.was_listening(since):
-                self._brief = since, self.silent_since
-                event = self._backchannel(self._scene.robot, self.id, since, self._speech_confidence)
-                event.spoken = (since,)
-                self.own_backchannel.gestures(event)
-                if self.silent_since is not None:
-                    self.own_backchannel.ends(self.silent_since)
+                self._sign = ListenerSign([Part("speak", since, self._speech_confidence, self.silent_since)])
+                self._judge()
         elif listens is False and self._brief is not None and self._brief[0] == since:
             is_answer = pair.human_begins("speak", since, self._speech_confidence)
             if is_answer and self._brief[1] is not None:
@@ -150,26 +222,6 @@ class Conversation:
         if not words or not pair.robot_holds_turn or pair.event is None or since < pair.event.started:
             return None
         return is_listening(words)
-
-    def gestures(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> None:
-        """Take a nod or a shake of the person."""
-        if self.robot_holds_floor and self.own_backchannel.state == UNDECIDED:
-            return  # A nod beside an "uh-huh" is part of the same sign, whatever the words turn out to be.
-        if self.robot_holds_floor:
-            self.own_backchannel.gestures(self._backchannel(self._scene.robot, self.id, at, confidence))
-        else:
-            self.pair.human_begins(action, at, confidence)
-
-    def gesture_ends(self, action: Action, at: Seconds) -> None:
-        if self.own_backchannel.state == BRIEF:
-            self.own_backchannel.ends(at)
-        self._ends(action, at, by_robot=False)
-
-    def points(self, at: Seconds, confidence: Probability = 1.0) -> None:
-        self.pair.human_begins("point", at, confidence)
-
-    def point_ends(self, at: Seconds) -> None:
-        self.pair.ends("point", at, by_robot=False)
 
     def manipulates(self, at: Seconds, confidence: Probability = 1.0) -> None:
         if self.acts_since is None:
@@ -254,7 +306,7 @@ class Conversation:
     def turn_ends(self, at: Seconds) -> None:
         # Before the pair is decided: of several answers during the turn the one that began first counts.
         if not self.robot_speaks_now:
-            self._keep_floor(at)
+            self._keep_floor()
         self.pair.turn_ends(at)
         self._floor_is_free(at)
 
@@ -266,23 +318,12 @@ class Conversation:
     def _floor_is_free(self, at: Seconds) -> None:
         """Turn undecided speech that outlasts the other's turn into a turn of its own."""
         if not self.robot_holds_floor:
-            self._keep_floor(at)
+            self._keep_floor()
         if self.robot_backchannel.state == UNDECIDED and not self.holds_floor:
             self._robot_takes_floor(at, "outlasts_turn")
 
-    def _keep_floor(self, at: Seconds) -> None:
-        """Leave the floor to a person whose undecided speech goes on while the robot gives it up."""
-        if self.own_backchannel.state == UNDECIDED:
-            self._takes_floor(at, "outlasts_turn")
-
     def _robot_takes_floor(self, at: Seconds, given: str = "limit") -> None:
         self.pair.robot_begins("speak", self.robot_backchannel.takes_floor(given, at))
-
-    def _takes_floor(self, at: Seconds, given: str = "limit") -> None:
-        """Turn the person's undecided speech into a turn since the speech began."""
-        since = self.own_backchannel.takes_floor(given, at)
-        self._human_turn(since, "speak", self._speech_confidence)
-        self.understand(since)
 
     def turn_ended(self, turn: str, at: Seconds) -> None:
         if self.pair.is_turn(turn):
@@ -302,7 +343,7 @@ class Conversation:
         until then. Else the limit of a backchannel and the robot's own limit for giving way would be two judges.
         """
         if self.pair.is_turn(turn):
-            self._keep_floor(at)
+            self._keep_floor()
             self.pair.abort(at)
             self._floor_is_free(at)
 
@@ -358,7 +399,11 @@ class Conversation:
         yield self.pair
 
     def _ends(self, action: Action, at: Seconds, *, by_robot: bool) -> None:
-        """End an action for all pairs, those that the robot cut into and the present one."""
+        """End an action for the sign that it is part of, and for all pairs: those cut into and the present one."""
+        if not by_robot and self._sign is not None:
+            for part in self._sign.going_on(action):
+                part.until = at
+            self._judge()
         for pair in self._pairs():
             pair.ends(action, at, by_robot=by_robot)
 

@@ -179,7 +179,7 @@ class PersonRecognition:
         del self._doing[action]
         match action:
             case "point":
-                self.talk.take(at, lambda talk: talk.point_ends(at))
+                self.talk.take(at, lambda talk: talk.gesture_ends("point", at))
             case "speak":
                 self._scene.falls_silent(self.id, at)
                 self.talk.falls_silent(at)
@@ -271,7 +271,7 @@ class PersonRecognition:
         objects = tuple(filter(self._scene.is_object, targets))
         if objects:
             self._human_directs(objects, at, at, confidence)
-        self.talk.shows(at, self._face, lambda talk: talk.points(at, confidence))
+        self.talk.shows(at, self._face, lambda talk: talk.gestures("point", at, confidence))
 
     def _look_directs(self, at: Seconds) -> None:
         self.gaze.spent = True

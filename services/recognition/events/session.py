@@ -293,6 +293,7 @@ class Session:
             self.scene.tells_addressees = True
             self.scene.told_addressees[words.actor, words.since] = words.to
         if words.text:
+            self.scene.worded.add(words.actor)
             self._writer.understand(words.actor, words.since, words.text, at)
         if words.actor in self.persons:
             self._people.apply(

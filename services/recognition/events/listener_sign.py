@@ -1,0 +1,76 @@
+"""A sign of a listener, and what it may turn out to be. Pure.
+
+While one speaks the other nods, says "uh-huh", laughs, or interrupts; and the answer often begins before the last
+word is over. All of these begin alike. So such a sign has several readings, of which what becomes known excludes one:
+
+| what is known | excludes |
+|---|---|
+| its words are a listener's ("uh-huh") | that it interrupts |
+| it has other words | that it is a backchannel |
+| it goes on when the speaker's turn is over: it is the answer | that it is a backchannel |
+| its speech is longer than a backchannel, and its words are not known | that it is a backchannel |
+| it is over, and nothing of this has been seen | that it interrupts |
+
+What one does at the same time is one sign: who nods and says "uh-huh" gives one backchannel. Without this the nod
+would be the answer if it begins a moment after the "uh-huh", and a backchannel if it begins a moment before. A sign
+is decided once: when one reading is left, at the latest at its `deadline`. Thesis 2.2.3 and 2.2.4.
+"""
+
+from msgspec import Struct
+
+from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.units import Probability, Seconds
+
+WORDS_WAIT: Seconds = 1.5
+"""Time from the beginning of a short speech in which its words may come, where somebody tells words. Ours."""
+
+
+class Part(Struct):
+    """A speech, or a gesture. until: None: it goes on."""
+
+    action: Action
+    since: Seconds
+    confidence: Probability = 1.0
+    until: Seconds | None = None
+
+
+class ListenerSign(Struct):
+    """All that a listener does at one time, in the order in which it began.
+
+    is_wordless: the words of its speech have not come in time.
+    """
+
+    parts: list[Part]
+    is_wordless: bool = False
+
+    @property
+    def since(self) -> Seconds:
+        return self.parts[0].since
+
+    @property
+    def until(self) -> Seconds | None:
+        """Time at which the last of it was over; None: it goes on."""
+        ends = [part.until for part in self.parts]
+        return None if None in ends else max(end for end in ends if end is not None)
+
+    @property
+    def speeches(self) -> list[Part]:
+        return [part for part in self.parts if part.action == "speak"]
+
+    @property
+    def confidence(self) -> Probability:
+        return min(part.confidence for part in self.parts)
+
+    def going_on(self, action: Action | None = None) -> list[Part]:
+        """What of it goes on. action: only what is such a one."""
+        return [part for part in self.parts if part.until is None and action in (None, part.action)]
+
+    def deadline(self, limit: Seconds) -> Seconds | None:
+        """Time at which its speech decides it, if its words do not; None: it has no speech, or that has decided.
+
+        limit: longest speech that is a backchannel.
+        """
+        if not self.speeches or self.is_wordless:
+            return None
+        speech = self.speeches[-1]
+        return speech.since + (limit if speech.until is None else WORDS_WAIT)
