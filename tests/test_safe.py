@@ -9,11 +9,10 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Pointing, Speech
-from engage_hri.schemas.blocks import BlockOutcome
+from engage_hri.schemas.blocks import BlockOutcome, BodyHeld
 from engage_hri.schemas.body import RobotState, WordSpoken
 from engage_hri.schemas.faults import Fault, RunFailed, ServerRestarted
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.holds import BodyHeld
 from engage_hri.schemas.messages import Message
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.results import PerformFailed

@@ -10,9 +10,9 @@ from typing import cast
 
 from lxml import etree
 
+from engage_hri.schemas.access import LARGEST
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.limits import LARGEST
-from engage_hri.schemas.utf8 import utf8
+from engage_hri.schemas.text import utf8
 
 DRAFT = "org.mindmakers.bml"
 BML_1_0 = "http://www.bml-initiative.org/bml/bml-1.0"

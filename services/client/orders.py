@@ -7,7 +7,6 @@ from itertools import count
 from typing import Any, Literal, Self
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.attention import Inhibit
 from engage_hri.schemas.blocks import (
     BehaviorInterrupted,
     InterruptBehavior,
@@ -18,8 +17,8 @@ from engage_hri.schemas.blocks import (
 )
 from engage_hri.schemas.body import Capabilities, DescribeBody
 from engage_hri.schemas.body_faults import BodyFault, BodyFaults, FaultsSwitched, SwitchFaults
-from engage_hri.schemas.conditions import ConditionSet, SetCondition, StudyCondition
 from engage_hri.schemas.faults import Fault, InputRefused, NoReply, RunFailed
+from engage_hri.schemas.fragments import ConditionSet, Inhibit, SetCondition, StudyCondition
 from engage_hri.schemas.requests import Outcome, Request
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Keep

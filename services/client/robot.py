@@ -16,21 +16,19 @@ from typing import get_args
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.behaviors import BlockBehavior, Constraint, EventKind
 from engage_hri.schemas.blocks import (
     Block,
     BlockOutcome,
     Composition,
+    Feedback,
+    Held,
     PerformBlock,
 )
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import Feedback
-from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
-from engage_hri.schemas.holds import Held
-from engage_hri.schemas.perception import Utterance
-from engage_hri.schemas.presence import PeerGone
+from engage_hri.schemas.fragments import FragmentOutcome, HeadOwner, PerformFragment, TurnClosed, TurnFragment
+from engage_hri.schemas.participants import PeerGone
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, Utterance
 from engage_hri.schemas.recognition import Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World

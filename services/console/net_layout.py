@@ -3,7 +3,7 @@
 The page and the drawing of `engage plan` show the same layout.
 """
 
-from engage_hri.schemas.nets import NetPlace, NetTransition
+from engage_hri.schemas.blocks import NetPlace, NetTransition
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.nets import NetInView, where
 from engage_hri.services.console.view import OWN_BLOCKS

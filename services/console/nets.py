@@ -9,9 +9,9 @@ from collections.abc import Iterator, Mapping
 from msgspec import Struct
 from msgspec.structs import replace
 
+from engage_hri.schemas.blocks import Fired, NetMarked, NetPlace, NetPlanned, NetTransition, NetWaiting
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.nets import Fired, NetMarked, NetPlace, NetPlanned, NetTransition, NetWaiting
-from engage_hri.schemas.presence import PeerGone
+from engage_hri.schemas.participants import PeerGone
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.wording import seconds
 

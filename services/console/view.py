@@ -7,20 +7,17 @@ the bus.
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.blocks import BlockProgress, Held, Hold, WarningFeedback
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.body_faults import BodyFault, BodyFaults
-from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import BlockProgress, WarningFeedback
-from engage_hri.schemas.holds import Held, Hold
+from engage_hri.schemas.fragments import Claim, HeadOwner, StudyCondition
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import Utterance
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, Utterance
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
-from engage_hri.schemas.speakable import joined
+from engage_hri.schemas.text import joined
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.shelf import Shelf
 from engage_hri.services.reports.in_force import InForce

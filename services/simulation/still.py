@@ -9,11 +9,10 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActorFound
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.perception import Utterance
+from engage_hri.schemas.perception import ActorFound, Utterance
+from engage_hri.schemas.text import utf8
 from engage_hri.schemas.units import FARTHEST, Stamp
-from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.client.people.perceived_actions import PerceivedActions

@@ -10,7 +10,6 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.attention import Inhibit, InhibitionEnded
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.blocks import (
     BehaviorInterrupted,
@@ -20,7 +19,14 @@ from engage_hri.schemas.blocks import (
     PerformBlock,
 )
 from engage_hri.schemas.faults import Fault, InputRefused, NoReply, RunFailed
-from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
+from engage_hri.schemas.fragments import (
+    FragmentOutcome,
+    Inhibit,
+    InhibitionEnded,
+    PerformFragment,
+    TurnClosed,
+    TurnFragment,
+)
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
 from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.units import Stamp

@@ -11,10 +11,17 @@ from typing import Any
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.faults import InputRefused, RunFailed
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import LONGEST_TEXT, Utterance
+from engage_hri.schemas.perception import (
+    LONGEST_TEXT,
+    ActionBegan,
+    ActionEnded,
+    ActorFound,
+    ActorLost,
+    OngoingActions,
+    Utterance,
+)
 from engage_hri.schemas.units import Stamp
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus

@@ -3,8 +3,8 @@
 import json
 from typing import Any
 
-from engage_hri.schemas.attention import Claim, HeadOwner
-from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.schemas.blocks import BlockProgress
+from engage_hri.schemas.fragments import Claim, HeadOwner
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.web.frames import HEARTBEAT, Viewer, You
 from engage_hri.services.console.web.lanes import KEPT

@@ -5,9 +5,9 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActorFound, OngoingActions
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.presence import PeerGone
+from engage_hri.schemas.participants import PeerGone
+from engage_hri.schemas.perception import ActionBegan, ActorFound, OngoingActions
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus

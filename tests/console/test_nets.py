@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from rich.cells import cell_len
 from rich.console import Console
 
-from engage_hri.schemas.nets import Fired, NetMarked, NetPlace, NetPlanned, NetPoint, NetTransition, NetWaiting
+from engage_hri.schemas.blocks import Fired, NetMarked, NetPlace, NetPlanned, NetPoint, NetTransition, NetWaiting
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.commandline.talk.net_drawing import drawing, legend
 from engage_hri.services.console import nets

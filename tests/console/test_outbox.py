@@ -5,7 +5,7 @@ import json
 from hypothesis import given
 from hypothesis import strategies as st
 
-from engage_hri.schemas.actions import ActionBegan, ActorFound
+from engage_hri.schemas.perception import ActionBegan, ActorFound
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.console.web import outbox
 from engage_hri.services.console.web.outbox import Outbox

@@ -10,7 +10,7 @@ from msgspec import Raw
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub

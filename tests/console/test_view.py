@@ -9,13 +9,14 @@ import pytest
 from msgspec.structs import replace
 from rich.console import Console
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.attention import Claim, HeadOwner
-from engage_hri.schemas.feedback import (
+from engage_hri.schemas.blocks import (
     BlockProgress,
+    Held,
+    Hold,
     WarningFeedback,
 )
-from engage_hri.schemas.holds import Held, Hold
+from engage_hri.schemas.fragments import Claim, HeadOwner
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.services.console import view
 from engage_hri.services.console.terminal import tally
 from engage_hri.services.console.terminal.log import Telling, line

@@ -5,7 +5,7 @@ import asyncio
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActorFound
+from engage_hri.schemas.perception import ActionBegan, ActorFound
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub

@@ -9,9 +9,9 @@ import pytest
 from engage_hri import perceive
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Speech
+from engage_hri.schemas.blocks import SyncPointProgress
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import OutcomeUnknown
-from engage_hri.schemas.feedback import SyncPointProgress
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.summary import Summary, summary

@@ -15,10 +15,9 @@ from msgspec import Raw, json
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.behaviors import Gaze, Speech, Wait
 from engage_hri.schemas.faults import EngageError
-from engage_hri.schemas.perception import Utterance
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, Utterance
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus

@@ -8,8 +8,8 @@ import pytest
 from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.behaviors import Action, Event, TurnSignal
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Subscription

@@ -9,10 +9,10 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.behaviors import Event
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.ledger import Step, Taken
+from engage_hri.schemas.participants import Step, Taken
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import RequestEvent
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub

@@ -11,12 +11,12 @@ from msgspec import Meta
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.advice import suggestion
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.perception import LONGEST_ID, LONGEST_TEXT, Utterance
-from engage_hri.schemas.suggestion import suggestion
+from engage_hri.schemas.text import is_utf8
 from engage_hri.schemas.units import A_DAY, Seconds, Stamp, Vector
-from engage_hri.schemas.utf8 import is_utf8
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.client.inputs import taken

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.reports.ongoing_actions import ActionEvent
 

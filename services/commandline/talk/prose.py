@@ -6,8 +6,8 @@ from collections.abc import Callable
 from msgspec.structs import replace
 from rich.console import Console
 
+from engage_hri.schemas.blocks import BlockProgress, WarningFeedback
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.feedback import BlockProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, HeardText
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import Utterance

@@ -6,7 +6,7 @@ from rich.table import Table
 from rich.text import Text
 
 from engage_hri.schemas.body_faults import words
-from engage_hri.schemas.utf8 import printable
+from engage_hri.schemas.text import printable
 from engage_hri.services.console import wording
 from engage_hri.services.console.view import Actor, EventInView, Scene
 

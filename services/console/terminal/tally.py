@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from engage_hri.schemas.behaviors import EventKind
-from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.schemas.blocks import BlockProgress
 from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics

@@ -5,9 +5,8 @@ Instants are seconds of the clock that feeds them. What ended long ago is forgot
 
 from collections.abc import Callable
 
-from engage_hri.schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress
-from engage_hri.schemas.nets import NetPlanned
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.blocks import BlockProgress, NetPlanned, PlannedPoint, PredictionFeedback, SyncPointProgress
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventState
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.view import OWN_BLOCKS

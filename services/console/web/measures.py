@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Collection, Mapping
 
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.web.lanes import Zero

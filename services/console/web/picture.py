@@ -12,20 +12,24 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.blocks import (
+    BlockProgress,
+    Held,
+    NetMarked,
+    NetPlanned,
+    NetWaiting,
+    PredictionFeedback,
+    SyncPointProgress,
+    WarningFeedback,
+)
 from engage_hri.schemas.body import Capabilities, RobotState
 from engage_hri.schemas.body_faults import BodyFaults, words
-from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
-from engage_hri.schemas.fragments import FragmentOutcome
-from engage_hri.schemas.holds import Held
+from engage_hri.schemas.fragments import FragmentOutcome, HeadOwner, StudyCondition
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.nets import NetMarked, NetPlanned, NetWaiting
-from engage_hri.schemas.presence import PeerAlive, PeerGone, is_claim
+from engage_hri.schemas.participants import PeerAlive, PeerGone, Status, is_claim
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
-from engage_hri.schemas.status import Status
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.console import net_layout, nets, view, wording

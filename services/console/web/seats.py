@@ -11,7 +11,7 @@ from uuid import uuid4
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds
 
 SETTLED: Seconds = 0.5

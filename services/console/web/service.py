@@ -9,12 +9,11 @@ from contextlib import asynccontextmanager
 from itertools import count
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import OngoingActions
 from engage_hri.schemas.body import Capabilities, DescribeBody
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.presence import PeerAlive, PeerGone
-from engage_hri.schemas.status import AskStatus, Status
+from engage_hri.schemas.participants import AskStatus, PeerAlive, PeerGone, Status
+from engage_hri.schemas.perception import OngoingActions
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Hub, Subscription
 from engage_hri.services.client.robot import Robot
