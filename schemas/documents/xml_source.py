@@ -223,3 +223,17 @@ def attributes(element: etree._Element) -> dict[str, str]:
     """Attributes of BML and EBML, by local name."""
     split_names = ((*split(str(name)), str(value)) for name, value in element.items())
     return {local: value for space, local, value in split_names if space in READ}
+
+
+_TEXT = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;"})
+_VALUE = _TEXT | str.maketrans({'"': "&quot;", "\n": "&#10;", "\r": "&#13;", "\t": "&#9;"})
+
+
+def escape(text: str) -> str:
+    """Write text between tags."""
+    return text.translate(_TEXT)
+
+
+def quoteattr(value: str) -> str:
+    """Write the value of an attribute, with its quotes."""
+    return f'"{value.translate(_VALUE)}"'

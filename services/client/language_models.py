@@ -29,8 +29,7 @@ from engage_hri.schemas.world import COVERED_FOR, CoveredObjects, World
 from engage_hri.services.client.chunking import UNKNOWN, Chunk, Chunker
 from engage_hri.services.client.feeds import Feed
 from engage_hri.services.client.inputs import call_in, shown, taken
-from engage_hri.services.client.results import PerformFailed
-from engage_hri.services.client.robot import Robot
+from engage_hri.services.client.robot import PerformFailed, Robot
 from engage_hri.services.requests.ends import Patience, Pending
 from engage_hri.services.text.pieces import Ids
 

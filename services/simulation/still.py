@@ -15,8 +15,8 @@ from engage_hri.schemas.text import utf8
 from engage_hri.schemas.units import FARTHEST, Stamp
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.client.people.perceived_actions import PerceivedActions
-from engage_hri.services.client.people.person_actions import PersonActions
+from engage_hri.services.client.people.actions import PersonActions
+from engage_hri.services.client.people.perceived_person import PerceivedActions
 from engage_hri.services.client.people.shared_world import SharedWorld
 from engage_hri.services.reports.ongoing_actions import ActionEvent
 from engage_hri.services.runtime.service import Ready

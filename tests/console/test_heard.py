@@ -12,8 +12,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.people.perceived_actions import PerceivedActions
-from engage_hri.services.client.people.perceived_person import PerceivedPerson
+from engage_hri.services.client.people.perceived_person import PerceivedActions, PerceivedPerson
 from engage_hri.services.console.follow import following
 from engage_hri.services.console.web.picture import Picture
 from engage_hri.services.console.web.service import PATTERNS

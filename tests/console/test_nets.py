@@ -13,8 +13,7 @@ from engage_hri.schemas.blocks import Fired, NetMarked, NetPlace, NetPlanned, Ne
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.commandline.talk.net_drawing import drawing, legend
 from engage_hri.services.console import nets
-from engage_hri.services.console.net_layout import laid_out
-from engage_hri.services.console.nets import NetInView, feed, in_view, told, where
+from engage_hri.services.console.nets import NetInView, feed, in_view, laid_out, told, where
 from engage_hri.services.console.terminal.live import NetLog
 from tests.random_cases import share_of
 

@@ -14,7 +14,7 @@ from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, Reques
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Subscription
 from engage_hri.services.bus.memory import MemoryBus
-from engage_hri.services.client.people.perceived_actions import PerceivedActions
+from engage_hri.services.client.people.perceived_person import PerceivedActions
 from engage_hri.services.recognition import intake, service
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.session import Session

@@ -17,7 +17,7 @@ from engage_hri.schemas.recognition import RequestEvent
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.samples import Received
-from engage_hri.services.client.people.perceived_actions import PerceivedActions
+from engage_hri.services.client.people.perceived_person import PerceivedActions
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.study.again import again
 from engage_hri.services.recognition.config import RecognitionConfig

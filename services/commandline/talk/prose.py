@@ -14,7 +14,7 @@ from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.summary import summary
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.client.hearing import NewWords
+from engage_hri.services.client.robot import NewWords
 from engage_hri.services.commandline.shell.outputs import Outputs
 from engage_hri.services.console import wording
 

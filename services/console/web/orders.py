@@ -14,8 +14,9 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import condition_words
 from engage_hri.schemas.perception import LONGEST_TEXT
 from engage_hri.schemas.units import Coordinate
-from engage_hri.services.console.web.receipts import Panel
 
+Panel = Literal["part", "wizard", "player"]
+"""Panel in which an order was given: the seat, the robot by hand, or the bar of a recording."""
 Right = Literal["seat", "speak", "steer", "faults", "condition"]
 ALL_RIGHTS: tuple[Right, ...] = ("seat", "speak", "steer", "faults", "condition")
 RIGHTS: dict[str, tuple[Right, ...]] = {

@@ -32,12 +32,11 @@ from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, 
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.console import net_layout, nets, view, wording
+from engage_hri.services.console import nets, view, wording
 from engage_hri.services.console.web import scene
 from engage_hri.services.console.web.health import HealthBoard
-from engage_hri.services.console.web.lanes import BlockLanes, EventLanes
+from engage_hri.services.console.web.lanes import BlockLanes, EventLanes, Measures
 from engage_hri.services.console.web.looking import plainly
-from engage_hri.services.console.web.measures import Measures
 from engage_hri.services.console.web.sections import Choice, HeadSection, Note, Switched, UtteranceShown
 from engage_hri.services.console.web.turns import ShownTurns
 from engage_hri.services.runtime.absent import Acquaintances
@@ -320,7 +319,7 @@ class Picture:
         if name.startswith(BLOCK):
             return self._blocks.shown(name.removeprefix(BLOCK), self.zero)
         if name.startswith(NET):
-            return net_layout.laid_out(self._nets[name.removeprefix(NET)], self.zero)
+            return nets.laid_out(self._nets[name.removeprefix(NET)], self.zero)
         if name.startswith(MEASURES):
             return self._measures.shown(name.removeprefix(MEASURES), self.zero)
         made: dict[str, Callable[[], Any]] = {
@@ -329,7 +328,7 @@ class Picture:
             "head": self._head,
             "events": lambda: self._events.shown(self.zero),
             "nets": lambda: list(self._nets),
-            "tokens": lambda: [net_layout.tokens(net) for net in self._nets.values()],
+            "tokens": lambda: [nets.tokens(net) for net in self._nets.values()],
             "delays": lambda: self._measures.delays(self.zero),
             "references": lambda: list(self._choices),
             "health": self._health.shown,

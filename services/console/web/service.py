@@ -18,11 +18,10 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Hub, Subscription
 from engage_hri.services.client.robot import Robot
 from engage_hri.services.console.follow import FOLLOWED, following
-from engage_hri.services.console.web.company import Invitation, invitation
 from engage_hri.services.console.web.health import NOTABLE
 from engage_hri.services.console.web.picture import Picture
 from engage_hri.services.console.web.script import Script
-from engage_hri.services.console.web.seats import Seats
+from engage_hri.services.console.web.seats import Invitation, Seats, invitation
 
 PATTERNS = (
     *FOLLOWED, keys.ANY_ALIVE, keys.WORLD, keys.ROBOT_STATE, keys.ROBOT_MOTION, keys.NET, keys.ROBOT_ONGOING,

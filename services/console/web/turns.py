@@ -16,8 +16,7 @@ from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.text import joined
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.view import OWN_BLOCKS, UtteranceInView
-from engage_hri.services.console.web.lanes import Zero
-from engage_hri.services.console.web.sections import Left, UtteranceShown
+from engage_hri.services.console.web.sections import Left, UtteranceShown, Zero
 
 TURNS_KEPT = 30
 BLOCKS_KEPT = 160
