@@ -62,7 +62,7 @@ def _style(scene: Scene, actor: str) -> str:
 def _people(scene: Scene) -> list[Text]:
     """Lines for all actors, the robot first, then one for the owner of its head, and one for the faults that are on
     and for what is held."""
-    actors = sorted(scene.actors, key=lambda actor: actor.id != scene.robot)
+    actors = sorted(scene.actors.values(), key=lambda actor: actor.id != scene.robot)
     wide = max((len(printable(actor.id)) for actor in actors), default=0)
     lines = [
         Text(printable(actor.id).ljust(wide) + " ", style=_style(scene, actor.id)) + _doing(scene, actor)

@@ -106,7 +106,7 @@ class Picture:
     @property
     def present(self) -> tuple[str, ...]:
         """Ids of the people who are there, and have a place."""
-        gone = {each.id for each in self._scene.actors if not each.present}
+        gone = {each.id for each in self._scene.actors.values() if not each.present}
         return tuple(each.id for each in self.world.people if each.id not in gone)
 
     @property

@@ -25,7 +25,7 @@ def section(scene: Scene, world: World | None, state: RobotState | None, body: C
     """Everything that is seen in space. world, state, body: None: nothing was told of it yet."""
     entities = world.entities if world is not None else ()
     people = {entity.id: entity.position for entity in entities if entity.kind == "person"}
-    actors = [actor.id for actor in scene.actors if actor.id != scene.robot and actor.present]
+    actors = [actor.id for actor in scene.actors.values() if actor.id != scene.robot and actor.present]
     shown = tuple(_person(scene.actor(id), people.get(id)) for id in dict.fromkeys((*people, *actors)))
     edges = _frame(entities, [each.at for each in shown if each.at is not None and each.present])
     return SceneSection(
