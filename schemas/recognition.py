@@ -187,6 +187,6 @@ class Statistics(Struct, frozen=True, kw_only=True, tag="statistics", omit_defau
     session: WindowStatistics
     recent: WindowStatistics
     engagement: Probability | None = None
-    level: Literal["engaged", "weakening", "disengaged", "unknown"] = "unknown"
+    level: Literal["engaged", "engaging", "disengaging", "disengaged", "unknown"] = "unknown"
     reasons: tuple[str, ...] = ()
     busy: bool = False

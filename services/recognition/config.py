@@ -56,9 +56,9 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     reference_mtbce: Seconds = 5.7
     """Pace to compare with until a person has shown five events: mean time between connection events, Table 2.1."""
     engaged_from: Probability = 0.5
-    """Estimate from which a person is engaged: for example all events good, but half as fast as usual. Ours."""
+    """Estimate from which a person is engaged: for example in contact all the time, while events fail. Ours."""
     disengaged_below: Probability = 0.25
-    """Estimate below which a person is disengaged; between the two, weakening. Ours."""
+    """Estimate below which a person is disengaged; between the two, engaging or disengaging. Ours."""
 
     def __post_init__(self) -> None:
         positive(self, (

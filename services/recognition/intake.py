@@ -219,7 +219,8 @@ class Intake:
         for message in self._open_events.feed(events, Stamp(self._clock.name, self._now)):
             out.append(PublishMessage(keys.open_events(message.actor), message))
         counted = [change for change in changes if isinstance(change, PersonForgotten) or not change.retold]
-        for statistics in self._statistics.feed(counted, self._recognizer.session.busy, self._now):
+        busy, contacts = self._recognizer.session.busy, self._recognizer.contacts()
+        for statistics in self._statistics.feed(counted, busy, self._now, contacts):
             if statistics.actor != "all":  # a person with this id would be taken for everybody
                 out.append(PublishMessage(keys.statistics(statistics.actor or "all"), statistics))
         if gone := [change.actor for change in changes if isinstance(change, PersonForgotten)]:

@@ -14,7 +14,7 @@ from itertools import count
 from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose, VoiceActivity
 from engage_hri.schemas.recognition import RequestEvent, SignalTurn
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.history import Latest
@@ -54,6 +54,8 @@ class Recognizer:
         """Bugs that have shown and are not reported yet."""
         self._covered = Covered(frozenset())
         self._now: Seconds = -math.inf
+        self._heads: dict[str, Probability | None] = {}
+        """How much the heads of people attend to the robot."""
         self._unaddressed: Latest[str, Seconds] = Latest(BLOCKS_KEPT)
         """Blocks in which the robot began to speak, in company, before it was known to whom; and when."""
 
@@ -117,6 +119,22 @@ class Recognizer:
         until = now if settled > now else math.nextafter(settled, -math.inf)
         return self._told([*results, *self.session.advance(until)])
 
+    def contacts(self) -> dict[str, Probability]:
+        """How much of a contact each person has with the robot, of those of whom that may have changed since then.
+
+        By what the session knows, or by how much the head attends to the robot, whichever is more.
+        """
+        changed = self.session.contacts()
+        for id, much in self._attention.attended.items():
+            self._heads[id] = much
+            if id in self.session.persons:
+                changed.setdefault(id, self.session.persons[id].contact)
+        self._attention.attended = {}
+        known = {
+            id: [each for each in (much, self._heads.get(id)) if each is not None] for id, much in changed.items()
+        }
+        return {id: max(much) for id, much in known.items() if much}
+
     def lose_track(self, person: str, at: Seconds) -> list[Result]:
         """Begin anew with this person after a failure: see `Session.lose_track`."""
         return self._told([*self.session.lose_track(person, at)])
@@ -168,6 +186,7 @@ class Recognizer:
             if isinstance(result, PersonForgotten):
                 self._interrupted.forget(result.actor)
                 self._words.forget(result.actor)
+                self._heads.pop(result.actor, None)
         mishaps, self._mishaps = self._mishaps, []
         return [*results, *mishaps]
 

@@ -81,7 +81,7 @@ def test_the_pause_of_table_2_1_is_no_disengagement_of_who_is_busy():
 def test_the_same_pause_of_who_is_not_busy_is_a_disengagement():
     told, begin, end = replayed(busy=False)
 
-    assert [level for at, level in told.levels if begin < at < end - 0.01] == ["weakening", "disengaged"]
+    assert [level for at, level in told.levels if begin < at < end - 0.01] == ["disengaging", "disengaged"]
     assert min(message.engagement for message in in_pause(told, begin, end)) < 0.2
 
 
@@ -107,7 +107,7 @@ def test_after_a_task_the_recent_pace_counts_again_once_the_window_holds_nothing
 
     assert told.messages[-1].at.seconds == 130.0
     assert told.messages[-1].engagement == pytest.approx(5.7 / 28.0)
-    assert told.levels[-2:] == [(129.0, "engaged"), (130.0, "weakening")]
+    assert told.levels[-2:] == [(129.0, "engaged"), (130.0, "disengaging")]
 
 
 def test_failures_are_forgotten_when_they_leave_the_window():
@@ -134,7 +134,7 @@ def test_whoever_is_busy_freezes_the_estimate_of_all_but_not_of_the_others():
         told.until(60.0)
 
     assert everybody.levels == [(0.0, "engaged")]
-    assert [level for _, level in bob.levels] == ["engaged", "weakening", "disengaged"]
+    assert [level for _, level in bob.levels] == ["engaged", "disengaging", "disengaged"]
 
 
 def test_who_has_left_is_disengaged_in_time_and_comes_back_as_the_same_person():
@@ -143,7 +143,7 @@ def test_who_has_left_is_disengaged_in_time_and_comes_back_as_the_same_person():
     told.until(3600.0)
     told.happens(event("dg-2", "started", 3600.0))
 
-    assert [level for _, level in told.levels] == ["engaged", "weakening", "disengaged", "engaged"]
+    assert [level for _, level in told.levels] == ["engaged", "disengaging", "disengaged", "engaged"]
     assert told.messages[-1].session.events == 2
 
 

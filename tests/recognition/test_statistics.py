@@ -152,12 +152,12 @@ def test_levels_change_only_beyond_the_margin():
 
     assert next_level("unknown", 0.5, config) == "engaged"
     assert next_level("engaged", 0.46, config) == "engaged"
-    assert next_level("engaged", 0.44, config) == "weakening"
-    assert next_level("weakening", 0.54, config) == "weakening"
-    assert next_level("weakening", 0.21, config) == "weakening"
-    assert next_level("weakening", 0.19, config) == "disengaged"
+    assert next_level("engaged", 0.44, config) == "disengaging"
+    assert next_level("engaging", 0.54, config) == "engaging"
+    assert next_level("disengaging", 0.21, config) == "disengaging"
+    assert next_level("disengaging", 0.19, config) == "disengaged"
     assert next_level("disengaged", 0.29, config) == "disengaged"
-    assert next_level("disengaged", 0.31, config) == "weakening"
+    assert next_level("disengaged", 0.31, config) == "engaging"
 
 
 def engagement(starts: list[float], failed: int = 0) -> Engagement:
@@ -181,7 +181,7 @@ def test_silence_weakens_and_then_breaks_engagement_at_foretold_times():
         levels.append(one.update(now, busy=False).level)
         times.append(round(now, 3))
 
-    assert levels == ["engaged", "weakening", "disengaged"]
+    assert levels == ["engaged", "disengaging", "disengaged"]
     assert times == [round(5.7 + 5.7 / 0.45 + 0.001, 3), round(5.7 + 5.7 / 0.2 + 0.001, 3)]
 
 
@@ -221,7 +221,7 @@ def test_statistics_are_published_again_when_time_changes_them_and_then_fall_sil
         now = published.deadline
         seen += [(round(now, 2), one.level, one.recent.events) for one in published.feed([], set(), now) if one.actor]
 
-    assert seen == [(13.67, "weakening", 1), (29.5, "disengaged", 1), (31.0, "disengaged", 0)]
+    assert seen == [(13.67, "disengaging", 1), (29.5, "disengaged", 1), (31.0, "disengaged", 0)]
 
 
 def test_statistics_are_published_when_somebody_gets_busy():

@@ -17,7 +17,7 @@ from engage_hri.schemas.units import Meters, Radians, Seconds, Vector
 Point = tuple[float, float]
 Zero = Callable[[Seconds], Seconds]
 """Conversion of an instant to seconds of the picture."""
-Level = Literal["engaged", "weakening", "disengaged", "unknown"]
+Level = Literal["engaged", "engaging", "disengaging", "disengaged", "unknown"]
 
 
 class Thing(Struct, frozen=True):

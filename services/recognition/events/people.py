@@ -28,6 +28,8 @@ class People:
         self._unseen: dict[str, Seconds] = {}
         """Time of the last sign of each person who has gone or is not reported as present. The longest ago first."""
         self._met = 0
+        self.touched: set[str] = set()
+        """Persons whose contact with the robot may have changed since somebody emptied this."""
         self._speech = 0
         """`scene.speech` when the deadlines of all were last updated."""
         self._scene = scene
@@ -158,6 +160,7 @@ class People:
         else:
             self._scene.questions.pop(person.id, None)
         self._agenda.set(person.id, person.deadline)
+        self.touched.add(person.id)
         here, was_here = person.presence.here, person.id in self._here
         (self._scene.found.add if here and person.presence.reported else self._scene.found.discard)(person.id)
         if was_here and not here:

@@ -207,6 +207,14 @@ class PersonRecognition:
         return self._scene.robot in self.gaze.targets
 
     @property
+    def contact(self) -> Probability | None:
+        """How much of a contact with the robot there is now; None: nobody has told where the person looks."""
+        together = any(each.is_shared for each in self.gaze_machines())
+        if self.presence.here and (self.on_robots_face or together or self.talk.speaks_to_robot):
+            return 1.0
+        return None if self.gaze.since == 0.0 and not self.gaze.targets else 0.0
+
+    @property
     def _face(self) -> str:
         """Whose face the person looks at; "": nobody's."""
         return next(filter(self._scene.is_face, self.gaze.targets), "")

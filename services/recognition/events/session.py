@@ -19,7 +19,7 @@ from engage_hri.schemas.fragments import HeadOwner
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn, TurnOutcome
 from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.addressing import EVERYBODY, Addressees, Spoken
@@ -95,6 +95,11 @@ class Session:
     def in_company(self) -> bool:
         """True if more than one person is here."""
         return len(self.scene.company("")) > 1
+
+    def contacts(self) -> dict[str, Probability | None]:
+        """How much of a contact there is with each for whom it may have changed since the last call."""
+        touched, self._people.touched = self._people.touched, set()
+        return {id: self.persons[id].contact for id in touched if id in self.persons}
 
     @property
     def busy(self) -> Set[str]:

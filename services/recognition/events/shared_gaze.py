@@ -39,6 +39,11 @@ class SharedGaze(Machine):
             return None
         return self.clock.deadline
 
+    @property
+    def is_shared(self) -> bool:
+        """True while both look there."""
+        return self.state == self.TOGETHER and self._shared_since is not None
+
     def expire(self, at: Seconds) -> None:
         """Decide the event at its deadline: the limit has passed, or the robot has never shown its target."""
         never_shown = self.clock is not None and self.clock.waiting

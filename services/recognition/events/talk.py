@@ -53,6 +53,11 @@ class Talk:
         return None if self._speech is None else self._speech.since
 
     @property
+    def speaks_to_robot(self) -> bool:
+        """True while the person says something that is known to be for the robot."""
+        return self._speech is not None and self._scene.robot in (self._speech.to or ())
+
+    @property
     def question(self) -> Question | None:
         """The robot's question that waits for the person's answer; None: none does, or that is not known yet."""
         return None if self._line else self._conversation.question

@@ -9,13 +9,14 @@ ignored, as long as the `Attention` lives. Actions carry the times at which they
 known only later; until then `undecided` says from when on.
 """
 
+import math
 from collections.abc import Iterable, Iterator
 from itertools import chain
 
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.body import Ray, RobotState
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose, VoiceActivity
-from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.schemas.units import Probability, Seconds, Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.interrupted_looks import Symbolic
@@ -25,6 +26,7 @@ from engage_hri.services.recognition.perceive.gaze_targets import GazeTargets, i
 from engage_hri.services.recognition.perceive.looks import ROUNDING, Change, Looking
 from engage_hri.services.recognition.perceive.manipulation import Manipulation, PersonChanges
 from engage_hri.services.recognition.perceive.speech import SpeechDetector
+from engage_hri.services.recognition.statistics.contact import attention
 from engage_hri.services.reports.action_reports import FACE_GRACE
 from engage_hri.services.runtime.absent import Absent
 
@@ -47,6 +49,8 @@ class _Actor:
         self.reported: set[Action] = set()
         """Actions that perception reports itself."""
         self.presence_reported = False
+        self.to_robot: Probability | None = None
+        """How much the head attends to the robot; None: it is not seen, or perception reports looks itself."""
 
     @property
     def face_lost_at(self) -> Seconds | None:
@@ -78,6 +82,8 @@ class Attention:
     def __init__(self, robot: str, config: RecognitionConfig, clock: str = "loop") -> None:
         self._robot = robot
         self._config = config
+        self.attended: dict[str, Probability | None] = {}
+        """How much heads attend to the robot, of those of which that has changed since somebody emptied this."""
         self._clock = clock
         self._gaze_targets = GazeTargets(robot, config)
         self._manipulation = Manipulation(robot, config)
@@ -134,6 +140,8 @@ class Attention:
         match report:
             case ActionBegan() | ActionEnded():
                 actor.reported.add(report.action)
+                if report.action == "look":
+                    self._attends(actor, None)
             case ActorFound():
                 actor.presence_reported = True
             case ActorLost():
@@ -153,6 +161,7 @@ class Attention:
                 self._lose(actor, at)
                 actions.append(ActorLost(actor=actor.id, at=self._stamp(at)))
             elif actor.face_lost_at is not None and now >= actor.face_lost_at - ROUNDING:
+                self._attends(actor, 0.0)
                 actions += self._tell(actor, actor.looking.lose(actor.posed_at))
             self._attend(actor.id)
         return actions
@@ -213,8 +222,14 @@ class Attention:
         if "look" in actor.reported:
             return actions
         gaze, present = (pose.position, pose.direction), actor.looking.nearest
+        self._attends(actor, round(attention(math.degrees(self._gaze_targets.angle_to_robot(gaze))), 1))
         seen = self._gaze_targets.target(actor.id, gaze, present=present, at=at, sure=pose.confidence)
         return actions + self._tell(actor, actor.looking.feed(seen, at))
+
+    def _attends(self, actor: _Actor, much: Probability | None) -> None:
+        if much != actor.to_robot:
+            actor.to_robot = much
+            self.attended[actor.id] = much
 
     def _take_voice(self, actor: _Actor, voice: VoiceActivity, at: Seconds) -> list[Symbolic]:
         if at <= actor.heard_at or voice.confidence < self._config.least_confidence:
@@ -228,6 +243,7 @@ class Attention:
     def _lose(self, actor: _Actor, at: Seconds) -> None:
         """End all that the person did, for the person has gone."""
         actor.seen = False
+        self._attends(actor, None if actor.to_robot is None else 0.0)
         actor.looking.lose(at)
         actor.voice.lose(at)
         self._manipulation.lose(actor.id)

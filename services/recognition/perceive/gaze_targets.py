@@ -156,6 +156,12 @@ class GazeTargets:
         else:
             self._spheres = None
 
+    def angle_to_robot(self, gaze: tuple[Vector, Vector]) -> Radians:
+        """Angle between a gaze, the place of the eyes and a direction, and the line to the robot's face."""
+        ray, face = _Gaze(*gaze), self._known[self._robot].entity.position
+        away = _minus(face, ray.eye)
+        return math.acos(max(-1.0, min(1.0, _dot(away, ray.axis) / max(math.hypot(*away), 1e-9))))
+
     def forget_face(self, actor: str) -> None:
         if self._known.pop(actor, None) is not None:
             self._spheres = None

@@ -1,23 +1,34 @@
-"""Estimate of engagement: pace times quality, with reasons, and a level that does not flutter. Thesis 2.3.
+"""Estimate of engagement: contact and pace, with reasons, and a level that does not flutter. Thesis 2.3.
 
-Pace compares the usual time between connection events with the recent one, or with the interval that is still
-open if that is longer. Quality is the share of recent events that did not fail. While the person is busy with a
-task nothing is concluded from silence: that explains the 70 s gap of the canapé study.
+Contact is what goes on: the share of the last seconds in which something was between the two (`contact`). Pace is
+what begins: the usual time between connection events over the recent one, or over the silence that goes on if that is
+longer; times the share of recent events that did not fail. Silence is only that in which there is no contact either:
+who tells the robot a story begins nothing for a minute. While the person is busy with a task nothing is concluded
+from silence: that explains the 70 s gap of the canapé study. The estimate is the mean of the two, or the one that is
+known.
+
+The levels are those of ROS4HRI: a person becomes engaged and leaves again by way of `engaging` and `disengaging`.
 """
 
 from typing import Literal, NamedTuple
 
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import HYSTERESIS, RecognitionConfig
+from engage_hri.services.recognition.statistics.contact import CONTACT_MEMORY, Contact
 from engage_hri.services.recognition.statistics.tally import EventTally
 
 ENOUGH_EVENTS = 5
 """Number of connection events from which a person's own mean counts; at least 2, since one event has no time between
 events. Ours."""
-Level = Literal["engaged", "weakening", "disengaged", "unknown"]
-
+Level = Literal["engaged", "engaging", "disengaging", "disengaged", "unknown"]
 JUST_AFTER: Seconds = 0.001
 """Delay after the instant at which the estimate is on a threshold; then it has passed it."""
+IN_CONTACT: Probability = 0.5
+"""Contact from which on there is no silence."""
+TOLD_AGAIN: Probability = 0.05
+"""Change of an estimate by contact alone from which on it is told again."""
+LOOK_AGAIN: Seconds = 1.0
+"""Time after which the estimate is looked at again while it changes by itself."""
 
 
 class EngagementEstimate(NamedTuple):
@@ -26,7 +37,7 @@ class EngagementEstimate(NamedTuple):
     reasons: tuple[str, ...]
 
 
-UNKNOWN = EngagementEstimate(None, "unknown", ("no connection event yet",))
+UNKNOWN = EngagementEstimate(None, "unknown", ("no connection event yet, and nobody tells of looks",))
 
 
 def pace(usual: Seconds, recent: Seconds | None, open: Seconds) -> Probability:
@@ -42,12 +53,14 @@ def quality(failed: int, judged: int) -> Probability:
 
 def next_level(level: Level, value: Probability, config: RecognitionConfig) -> Level:
     """Level of `value`; it changes only when the value has passed a threshold by the hysteresis."""
-    margin = HYSTERESIS
-    engaged_from = config.engaged_from + {"engaged": -margin, "unknown": 0.0}.get(level, margin)
-    disengaged_below = config.disengaged_below + {"disengaged": margin, "unknown": 0.0}.get(level, -margin)
+    margin = 0.0 if level == "unknown" else HYSTERESIS
+    engaged_from = config.engaged_from + (-margin if level == "engaged" else margin)
+    disengaged_below = config.disengaged_below + (margin if level == "disengaged" else -margin)
     if value >= engaged_from:
         return "engaged"
-    return "disengaged" if value < disengaged_below else "weakening"
+    if value < disengaged_below:
+        return "disengaged"
+    return "disengaging" if level in ("engaged", "disengaging") else "engaging"
 
 
 class Engagement:
@@ -56,43 +69,70 @@ class Engagement:
     def __init__(self, config: RecognitionConfig, tally: EventTally) -> None:
         self.estimate = UNKNOWN
         self.busy = False
+        self.contact = Contact()
         self._config = config
         self._tally = tally
         self._busy_until: Seconds = float("-inf")
+        self._apart_since: Seconds = float("-inf")
+        """Time at which the last contact ended."""
+
+    def touch(self, much: Probability, at: Seconds) -> None:
+        """Take how much of a contact there is from `at` on."""
+        if (self.contact.now or 0.0) >= IN_CONTACT > much:
+            self._apart_since = at
+        self.contact.change(much, at)
 
     def update(self, now: Seconds, *, busy: bool) -> EngagementEstimate:
         """Update the estimate, and return it. busy: True freezes it as it was when the task began."""
         if self.busy and not busy:
             self._busy_until = now
-        if not (self.busy and busy) and self._tally.starts.last is not None:
-            self.estimate = self._estimate(now, max(0.0, now - self._silent_since))
+        if not (self.busy and busy):
+            self.estimate = self._estimate(now)
         if busy and not self.busy:
             reasons = ("busy with a task: estimate frozen", *self.estimate.reasons)
             self.estimate = self.estimate._replace(reasons=reasons)
         self.busy = busy
         return self.estimate
 
-    @property
-    def _silent_since(self) -> Seconds:
-        """Time of the last start or of the end of the last task, whichever was later."""
-        last = self._tally.starts.last
-        return self._busy_until if last is None else max(last, self._busy_until)
+    def changes(self, now: Seconds) -> bool:
+        """True if the level, or by contact the value, is another now than it was told."""
+        estimate, told = self._estimate(now), self.estimate.value
+        drifts = self.contact.now is not None and abs((estimate.value or 0.0) - (told or 0.0)) >= TOLD_AGAIN
+        return not self.busy and (drifts or estimate.level != self.estimate.level)
 
-    def _estimate(self, now: Seconds, open: Seconds) -> EngagementEstimate:
-        usual = self._usual
+    def _estimate(self, now: Seconds) -> EngagementEstimate:
+        known: list[Probability] = []
+        reasons: list[str] = []
+        if self.contact.now is not None:
+            known.append(self.contact.share(now))
+            reasons.append(f"contact {known[-1]:.2f}: looks, talk and shared looks of the last {CONTACT_MEMORY:g} s")
+        if self._tally.starts.last is not None:
+            value, why = self._pace(now)
+            known.append(value)
+            reasons += why
+        if not known:
+            return UNKNOWN
+        value = sum(known) / len(known)
+        return EngagementEstimate(value, next_level(self.estimate.level, value, self._config), tuple(reasons))
+
+    def _pace(self, now: Seconds) -> tuple[Probability, tuple[str, str]]:
+        """Pace times quality, and why."""
+        usual, silent = self._usual, self._silence(now)
         recent = self._tally.recent_mean(now) if now >= self._recent_from else None
         failed, judged = self._tally.judged(now)
-        speed, good = pace(usual, recent, open), quality(failed, judged)
-        value = speed * good
+        speed, good = pace(usual, recent, silent), quality(failed, judged)
         between = f"{recent:.1f} s between recent events" if recent is not None else "no recent pace"
-        return EngagementEstimate(
-            value,
-            next_level(self.estimate.level, value, self._config),
-            (
-                f"pace {speed:.2f}: {between}, {open:.1f} s since the last, usually {usual:.1f} s",
-                f"quality {good:.2f}: {failed} of {judged} recent events failed",
-            ),
+        return speed * good, (
+            f"pace {speed:.2f}: {between}, {silent:.1f} s of silence, usually {usual:.1f} s",
+            f"quality {good:.2f}: {failed} of {judged} recent events failed",
         )
+
+    def _silence(self, now: Seconds) -> Seconds:
+        """Time since the last start, the end of the last task or contact, whichever was last; 0 in contact."""
+        last = self._tally.starts.last
+        if last is None or (self.contact.now or 0.0) >= IN_CONTACT:
+            return 0.0
+        return max(0.0, now - max(last, self._busy_until, self._apart_since))
 
     @property
     def _usual(self) -> Seconds:
@@ -107,23 +147,29 @@ class Engagement:
         return self._busy_until + self._config.window
 
     def next_change(self, now: Seconds) -> Seconds | None:
-        """Time of the next change by silence alone that matters: the level falls, or recent pace counts again.
+        """Time at which to look whether the level has changed by itself; None: it does not.
 
-        None if there is none, or if the estimate is frozen. The tally's own `next_change` may come first.
+        The tally's own `next_change` may come first.
         """
-        if self.busy or self._tally.starts.last is None:
+        if self.busy or self.estimate.level == "unknown":
             return None
-        changes = (self._recent_from, self._level_falls(now))
-        return min((at for at in changes if at is not None and at > now), default=None)
+        changes = [self._recent_from] if self._recent_from > now else []
+        if self.contact.now is None:
+            changes += self._level_falls(now)
+        elif not self.contact.is_settled(now) or not (self.contact.now >= IN_CONTACT or self._is_low):
+            changes.append(now + LOOK_AGAIN)
+        return min((at for at in changes if at > now), default=None)
 
-    def _level_falls(self, now: Seconds) -> Seconds | None:
-        """Time at which silence alone has passed the next threshold; None if it never does."""
+    @property
+    def _is_low(self) -> bool:
+        """True if silence changes the level no more."""
+        return self.estimate.level == "disengaged" or self._tally.starts.last is None
+
+    def _level_falls(self, now: Seconds) -> list[Seconds]:
+        """Time at which silence alone has passed the next threshold, where pace is all that is known."""
         level = self.estimate.level
-        if level not in ("engaged", "weakening"):
-            return None
-        threshold = self._config.engaged_from if level == "engaged" else self._config.disengaged_below
-        threshold -= HYSTERESIS
+        threshold = (self._config.engaged_from if level == "engaged" else self._config.disengaged_below) - HYSTERESIS
         good = quality(*self._tally.judged(now))
-        if threshold <= 0.0 or good <= threshold:
-            return None
-        return self._silent_since + self._usual * good / threshold + JUST_AFTER
+        if level == "disengaged" or threshold <= 0.0 or good <= threshold:
+            return []
+        return [now - self._silence(now) + self._usual * good / threshold + JUST_AFTER]
