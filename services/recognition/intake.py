@@ -37,6 +37,7 @@ from engage_hri.services.recognition.events.machine import Mishap, PersonForgott
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
 from engage_hri.services.recognition.events.scene import Worded
 from engage_hri.services.recognition.perceive.clock_errors import ClockErrors
+from engage_hri.services.recognition.perceive.clock_restarts import ClockRestarts
 from engage_hri.services.recognition.perceive.words import TimedWords
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
@@ -58,6 +59,8 @@ Content = (
 )  # fmt: skip
 """Messages that recognition takes into account."""
 _CONTENT = get_args(Content)
+_News = ActionBegan | ActionEnded | ActorFound | ActorLost | HeadPose | VoiceActivity | Utterance
+"""Messages that tell of what has just happened."""
 
 COMPLAINTS = 100
 """Number of bad ids that are reported as faults."""
@@ -81,6 +84,9 @@ class Intake:
         self._bad_ids: set[str] = set()
         self._reports = ActionReports(robot, REPORT_GRACE, clock.name, self._instant)
         self._clock_errors = ClockErrors(robot)
+        self._restarts = ClockRestarts()
+        self._source = ""
+        """Who has sent the message that is being taken."""
         self._recognizer = Recognizer(robot, config, clock=clock.name, name=f"{session}-", strict=False)
         self._open_events = OpenEventTracker(robot, session)
         self._statistics = PublishedStatistics(robot, config, clock.name)
@@ -104,11 +110,14 @@ class Intake:
 
     def take(self, input: Input[Content], now: Seconds) -> list[Output]:
         """Take a message."""
-        self._now = now
+        self._now, self._source = now, input.source
         message = input.message
         if isinstance(message, Cancel):
             self._feed(message, now)
         elif self._is_credible(input):
+            if isinstance(message, _News) and not input.past:
+                told = self._clock.local(message.at, now)
+                self._restarts.hear(input.source, message.at, now if isnan(told) else told, now)
             self._tell(self._reports.take(message, input.key, input.source, input.life, now, past=input.past))
             if isinstance(message, Utterance):
                 self._hear(message)
@@ -187,6 +196,7 @@ class Intake:
     def _instant(self, stamp: Stamp) -> Seconds:
         """Local time of a stamp, at most now and at least `OLDEST` ago."""
         now, told = self._now, self._clock.local(stamp, self._now)
+        told += self._restarts.ahead(self._source, stamp.clock)
         return now if isnan(told) else max(min(told, now), now - OLDEST)
 
     def _note_error(self, actor: str, stamp: Stamp, at: Seconds, *, is_sure: bool = True) -> None:
