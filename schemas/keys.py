@@ -62,6 +62,8 @@ ROBOT_ONGOING = f"{PREFIX}/state/control/ongoing_actions"
 ROBOT_STATE = f"{PREFIX}/state/control/robot_state"
 ROBOT_SEEN = f"{PREFIX}/state/control/seen"
 
+FLOOR = f"{PREFIX}/state/recognition/floor"
+"""`Floor`."""
 ROBOT_MOTION = f"{PREFIX}/stream/control/robot_state"
 """The same as `ROBOT_STATE`, many times a second, while somebody listens."""
 NET = f"{PREFIX}/stream/realizer/net"
@@ -78,6 +80,7 @@ ANY_ACTION = f"{PREFIX}/evt/*/action"
 ANY_PERCEIVED_ONGOING = f"{PREFIX}/state/perception/ongoing_actions/*/*"
 ANY_OPEN_EVENTS = f"{PREFIX}/state/recognition/open_events/*"
 ANY_STATISTICS = f"{PREFIX}/state/recognition/statistics/*"
+ANY_INTERJECTION = f"{PREFIX}/evt/recognition/interjection/*"
 ANY_SETTINGS = f"{PREFIX}/state/*/settings"
 ANY_ALIVE = f"{PREFIX}/alive/*/*"
 ANY_ROBOT_ALIVE = f"{PREFIX}/alive/robot/*"
@@ -227,6 +230,11 @@ def chunk(name: str) -> str:
 def is_chunk(name: str) -> bool:
     """Tell whether a name can stand in a key, where wildcards reach it."""
     return bool(name) and name[0] != "@" and not any(letter in "/*$?#" for letter in name)
+
+
+def interjection(actor: str) -> str:
+    """Key of what a person says into the robot's turn."""
+    return f"{PREFIX}/evt/recognition/interjection/{actor}"
 
 
 def open_events(actor: str) -> str:

@@ -51,6 +51,7 @@ Message = (
     | world.World
     | recognition.RequestEvent | recognition.EventOutcome | recognition.SignalTurn | recognition.TurnOutcome
     | recognition.ConnectionEvent | recognition.OpenEvents | recognition.Statistics
+    | recognition.Interjection | recognition.Floor
     | participants.Taken | participants.AskStatus | participants.Status | participants.ServiceSettings
     | participants.PeerAlive | participants.PeerGone
 )  # fmt: skip
@@ -69,7 +70,10 @@ COMMANDS: Mapping[str, tuple[type[requests.Request], ...]] = {
 }
 """Commands on each key; besides, `keys.cancel` takes `Cancel`, and `keys.keep_alive` takes `KeepAlive`."""
 
-OUTWARD = (recognition.ConnectionEvent, recognition.OpenEvents, recognition.Statistics, perception.Utterance)
+OUTWARD = (
+    recognition.ConnectionEvent, recognition.OpenEvents, recognition.Statistics, recognition.Interjection,
+    recognition.Floor, perception.Utterance,
+)  # fmt: skip
 """Messages for programs of others, a few a second at most: published as JSON, which every language reads. All others
 are MessagePack."""
 

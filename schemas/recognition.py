@@ -96,6 +96,44 @@ class OpenEvents(Struct, frozen=True, kw_only=True, tag="open_events", omit_defa
     events: tuple[ConnectionEvent, ...] = ()
 
 
+InterjectionReading = Literal["open", "backchannel", "interruption", "answer", "noise", "other"]
+
+
+class Interjection(Struct, frozen=True, kw_only=True, tag="interjection", omit_defaults=True):
+    """evt: recognition. What a person says into the robot's turn: told at once, and again when it is decided.
+
+    actor: the person. since: when the speech began; of one person it names the speech. at: when this was known.
+    reading: `open`: it may be any of these. `backchannel`: a listener's "uh-huh". `interruption`: it takes the floor.
+    `answer`: it goes on when the turn is over. `noise`: a laugh or a cough, of which no words have come. `other`: it
+    is for somebody else.
+    words: as far as they are known.
+    """
+
+    actor: str
+    since: Stamp
+    at: Stamp
+    reading: InterjectionReading
+    words: str = ""
+
+
+class FloorSpeech(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A speech that goes on. actor: who speaks. to: ids of its addressees; empty: they are not known yet."""
+
+    actor: str
+    since: Stamp
+    to: tuple[str, ...] = ()
+
+
+class Floor(Struct, frozen=True, kw_only=True, tag="floor", omit_defaults=True):
+    """state: recognition. Who has the floor: all speeches that go on, the first first; the others overlap it.
+
+    at: the instant of the last change.
+    """
+
+    at: Stamp
+    speeches: tuple[FloorSpeech, ...] = ()
+
+
 class RequestEvent(Request, frozen=True, kw_only=True, tag="request_event", omit_defaults=True):
     """cmd: realizer -> recognition: begin a connection event (thesis Fig. 5.2). Terminal state: `EventOutcome`.
 

@@ -28,7 +28,16 @@ from engage_hri.schemas.perception import (
     Utterance,
     VoiceActivity,
 )
-from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, TurnOutcome
+from engage_hri.schemas.recognition import (
+    ConnectionEvent,
+    EventOutcome,
+    Floor,
+    FloorSpeech,
+    Interjection,
+    RequestEvent,
+    SignalTurn,
+    TurnOutcome,
+)
 from engage_hri.schemas.requests import Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
@@ -90,6 +99,9 @@ class Intake:
         self._recognizer = Recognizer(robot, config, clock=clock.name, name=f"{session}-", strict=False)
         self._open_events = OpenEventTracker(robot, session)
         self._statistics = PublishedStatistics(robot, config, clock.name)
+        self._floor = Floor(at=Stamp(clock.name, 0.0))
+        self._floor_changes = 0
+        """`scene.floor_changes` when the floor was last looked at."""
         self._outputs: list[Output] = []
 
     @property
@@ -204,6 +216,20 @@ class Intake:
         is_sure = is_sure and at <= self._clock.local(stamp, self._now)
         self._clock_errors.heard(actor, at, self._clock.error(stamp.clock) if is_sure else inf)
 
+    def _tell_floor(self) -> None:
+        """Tell who speaks, if that has changed."""
+        session, name = self._recognizer.session, self._clock.name
+        if session.scene.floor_changes == self._floor_changes:
+            return
+        self._floor_changes = session.scene.floor_changes
+        told = [
+            FloorSpeech(actor=who, since=Stamp(name, at), to=tuple(sorted(to))) for who, at, to in session.floor()
+        ]
+        floor = Floor(at=Stamp(name, self._now), speeches=tuple(told))
+        if floor.speeches != self._floor.speeches:
+            self._floor = floor
+            self._outputs.append(PublishMessage(keys.FLOOR, floor))
+
     def _note(self, results: Iterable[Result], request: str = "") -> None:
         """Note what is to be published. request: the one that was fed; a bug ends it."""
         changes: list[ConnectionEvent | PersonForgotten] = []
@@ -214,6 +240,8 @@ class Intake:
                     result = self._clock_errors.marked(result)
                     changes.append(result)
                     out.append(PublishMessage(keys.connection_event(result.person(self._robot), result.kind), result))
+                case Interjection(actor=actor):
+                    out.append(PublishMessage(keys.interjection(actor), result))
                 case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
                     out.append(PublishMessage(keys.RECOGNIZED_ACTION, result))
                 case Accepted() | Refused() | TurnOutcome():
@@ -225,6 +253,7 @@ class Intake:
                     self._reports.forget(actor)
                 case Mishap(actor=actor, error=error):
                     out.append(TellMistake(error, f"what {actor or 'somebody'} does", request))
+        self._tell_floor()
         events = [change for change in changes if isinstance(change, ConnectionEvent)]
         for message in self._open_events.feed(events, Stamp(self._clock.name, self._now)):
             out.append(PublishMessage(keys.open_events(message.actor), message))

@@ -83,6 +83,8 @@ class OwnSpeech(Struct):
     words: str = ""
     to: Addressees | None = None
     """Addressees; None: they are not known yet."""
+    is_interjected: bool = False
+    """True if it began while the robot had the floor."""
     spoken: Spoken | None = None
     """The speech as the others remember it, once its addressees are known."""
 

@@ -6,12 +6,14 @@ They are input of the adjacency pair and of the two backchannels, the person's o
 from collections.abc import Callable, Iterator
 
 from engage_hri.schemas.behaviors import Action, Cause
+from engage_hri.schemas.recognition import InterjectionReading
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.adjacency_pair import AdjacencyPair
 from engage_hri.services.recognition.events.backchannel import BRIEF, UNDECIDED, Backchannel
+from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.limits import in_time
-from engage_hri.services.recognition.events.listener_sign import ListenerSign, Part
+from engage_hri.services.recognition.events.listener_sign import WORDS_WAIT, ListenerSign, Part
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import Question, SessionScene
 from engage_hri.services.text.listening import is_listening
@@ -20,6 +22,10 @@ TURN_PATIENCE: Seconds = 12.0
 """Time after the robot's last word for which its unfinished turn still counts; longer than the silence after which
 generation closes a turn (10 s). Also the time, after the limit, for which an anchor that does not come is waited for.
 Ours."""
+
+
+SPEECHES_KEPT = 8
+"""Number of speeches of which words may still tell that they were a listener's."""
 
 
 class Conversation:
@@ -41,6 +47,8 @@ class Conversation:
         self.robot_speaks_now = robot_speaks
         """True while the robot speaks to this person."""
         self._speech_confidence: Probability = 1.0
+        self._speeches: Latest[Seconds, Seconds | None] = Latest(SPEECHES_KEPT)
+        """Ends of the person's latest speeches, by their starts; None: it goes on."""
         self._sign: ListenerSign | None = None
         """What the person does in the robot's turn, as long as it is not decided what it is."""
         self._brief: tuple[Seconds, Seconds | None] | None = None
@@ -104,6 +112,7 @@ class Conversation:
         if self.speaks_since is not None:
             return
         self.speaks_since, self.silent_since = at, None
+        self._speeches[at] = None
         self._speech_confidence = confidence
         # A line that was typed has no length by which it could be judged: who sends one has something to say.
         if self.robot_holds_floor and self._scene.lines.get(self.id) != at:
@@ -114,6 +123,7 @@ class Conversation:
     def falls_silent(self, at: Seconds) -> None:
         if self.speaks_since is None:
             return
+        self._speeches[self.speaks_since] = at
         self.speaks_since, self.silent_since = None, at
         self._ends("speak", at, by_robot=False)
         self._floor_is_free(at)
@@ -133,27 +143,32 @@ class Conversation:
     def _signs(self, action: Action, at: Seconds, confidence: Probability) -> None:
         if self._sign is not None and self._sign.until is not None:
             self._was_backchannel(self._sign, self._sign.until)  # its words have not come until the next one begins
+        self._joins(Part(action, at, confidence))
+
+    def _joins(self, part: Part) -> None:
+        """Make a part of the sign that goes on, or of a new one."""
         if self._sign is None:
             self._sign = ListenerSign([])
-        self._sign.parts.append(Part(action, at, confidence))
+        self._sign.parts.append(part)
 
     @property
     def _sign_deadline(self) -> Seconds | None:
         sign = self._sign
         if sign is None or (sign.speeches and self._listens(sign.speeches[-1].since)):
             return None
-        return sign.deadline(self._config.backchannel_limit)
+        is_worded = self.pair.robot_holds_turn and self.id in self._scene.worded
+        return sign.deadline(WORDS_WAIT if is_worded else self._config.backchannel_limit)
 
     def _sign_is_due(self, at: Seconds) -> None:
         """Decide the sign: its speech has become too long for a backchannel, or its words have not come."""
         assert self._sign is not None
         if speech := self._sign.going_on("speak"):
-            self._answers(speech[0])
+            self._answers(speech[0], at)
         else:
             self._sign.is_wordless = True
-            self._judge()
+            self._judge(at)
 
-    def _judge(self) -> None:
+    def _judge(self, at: Seconds) -> None:
         """Decide the sign, if what is known leaves one reading of it."""
         sign = self._sign
         if sign is None:
@@ -163,55 +178,64 @@ class Conversation:
         may_be_known = self.pair.robot_holds_turn and self.id in self._scene.worded and not sign.is_wordless
         is_known = not may_be_known or all(listens for listens, _ in heard)
         if interrupts is not None:
-            self._answers(interrupts)
+            self._answers(interrupts, at)
         elif sign.until is not None and is_known:
             self._was_backchannel(sign, sign.until)
 
     def _was_backchannel(self, sign: ListenerSign, until: Seconds) -> None:
-        self._sign = None
+        if sign is self._sign:
+            self._sign = None
         if all(part.action == "point" for part in sign.parts):
             return  # a point in the robot's turn directs the gaze, and says nothing
         event = self._backchannel(self._scene.robot, self.id, sign.since, sign.confidence)
+        for speech in sign.speeches:
+            is_noise = self.id in self._scene.worded and not self._writer.text_of(self.id, speech.since)
+            self._writer.interject(self.id, speech.since, "noise" if is_noise else "backchannel", until)
         if sign.speeches:
             event.spoken = tuple(speech.since for speech in sign.speeches)
             self._brief = sign.speeches[-1].since, sign.speeches[-1].until
         self.own_backchannel.speaks(event)
         self.own_backchannel.ends(until)
 
-    def _answers(self, part: Part) -> None:
+    def _answers(self, part: Part, at: Seconds, reading: InterjectionReading = "interruption") -> None:
         """Take a part of the sign as a turn of the person since it began."""
         self._sign = None
         if part.action == "speak":
+            self._writer.interject(self.id, part.since, reading, at)
             self._human_turn(part.since, "speak", part.confidence)
-            self.understand(part.since)
+            self.understand(part.since, at)
         elif self.pair.human_begins(part.action, part.since, part.confidence) and part.until is not None:
             self.pair.ends(part.action, part.until, by_robot=False)
 
-    def _keep_floor(self) -> None:
+    def _keep_floor(self, at: Seconds, reading: InterjectionReading = "answer") -> None:
         """Take what goes on of a sign for the answer, because the robot's turn is over.
 
         Of several parts it is the one that began first. A gesture that answers nothing here stays what it is.
         """
         for part in self._sign.going_on() if self._sign is not None else ():
             if part.action == "speak" or self.pair.may_be_answered_with(part.action):
-                self._answers(part)
+                self._answers(part, at, reading)
                 return
 
-    def understand(self, since: Seconds) -> None:
+    def understand(self, since: Seconds, at: Seconds) -> None:
         """Judge speech in the robot's turn by its words, if they are known before the turn is over.
 
         They may come when its length has already decided: a "stop" was too short for an answer, and "yes, yes, okay"
         too long for a backchannel.
         """
         if self._sign is not None and any(speech.since == since for speech in self._sign.speeches):
-            self._judge()
+            self._judge(at)
             return
         pair, listens = self.pair, self._listens(since)
         if listens:
             if pair.was_listening(since):
-                self._sign = ListenerSign([Part("speak", since, self._speech_confidence, self.silent_since)])
-                self._judge()
+                part = Part("speak", since, self._speech_confidence, self._speeches.get(since))
+                if part.until is None:
+                    self._joins(part)
+                else:
+                    self._was_backchannel(ListenerSign([part]), part.until)
         elif listens is False and self._brief is not None and self._brief[0] == since:
+            self._writer.interject(self.id, since, "interruption", at)
             is_answer = pair.human_begins("speak", since, self._speech_confidence)
             if is_answer and self._brief[1] is not None:
                 pair.ends("speak", self._brief[1], by_robot=False)
@@ -306,7 +330,7 @@ class Conversation:
     def turn_ends(self, at: Seconds) -> None:
         # Before the pair is decided: of several answers during the turn the one that began first counts.
         if not self.robot_speaks_now:
-            self._keep_floor()
+            self._keep_floor(at)
         self.pair.turn_ends(at)
         self._floor_is_free(at)
 
@@ -318,7 +342,7 @@ class Conversation:
     def _floor_is_free(self, at: Seconds) -> None:
         """Turn undecided speech that outlasts the other's turn into a turn of its own."""
         if not self.robot_holds_floor:
-            self._keep_floor()
+            self._keep_floor(at)
         if self.robot_backchannel.state == UNDECIDED and not self.holds_floor:
             self._robot_takes_floor(at, "outlasts_turn")
 
@@ -343,7 +367,7 @@ class Conversation:
         until then. Else the limit of a backchannel and the robot's own limit for giving way would be two judges.
         """
         if self.pair.is_turn(turn):
-            self._keep_floor()
+            self._keep_floor(at, "interruption")
             self.pair.abort(at)
             self._floor_is_free(at)
 
@@ -403,7 +427,7 @@ class Conversation:
         if not by_robot and self._sign is not None:
             for part in self._sign.going_on(action):
                 part.until = at
-            self._judge()
+            self._judge(at)
         for pair in self._pairs():
             pair.ends(action, at, by_robot=by_robot)
 

@@ -8,7 +8,7 @@ word is over. All of these begin alike. So such a sign has several readings, of 
 | its words are a listener's ("uh-huh") | that it interrupts |
 | it has other words | that it is a backchannel |
 | it goes on when the speaker's turn is over: it is the answer | that it is a backchannel |
-| its speech is longer than a backchannel, and its words are not known | that it is a backchannel |
+| its speech is longer than a backchannel, or than words take to come, and they have not | that it is a backchannel |
 | it is over, and nothing of this has been seen | that it interrupts |
 
 What one does at the same time is one sign: who nods and says "uh-huh" gives one backchannel. Without this the nod
@@ -22,7 +22,7 @@ from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.units import Probability, Seconds
 
 WORDS_WAIT: Seconds = 1.5
-"""Time from the beginning of a short speech in which its words may come, where somebody tells words. Ours."""
+"""Time from the beginning of a speech in which its words may come, where somebody tells words. Laughter has none."""
 
 
 class Part(Struct):

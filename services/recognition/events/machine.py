@@ -11,7 +11,15 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Action, Cause, EventKind
-from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventOutcome, EventState, TurnOutcome
+from engage_hri.schemas.recognition import (
+    ENDINGS,
+    ConnectionEvent,
+    EventOutcome,
+    EventState,
+    Interjection,
+    InterjectionReading,
+    TurnOutcome,
+)
 from engage_hri.schemas.requests import Accepted, Refused
 from engage_hri.schemas.units import Probability, Seconds, Stamp
 from engage_hri.services.recognition.events.history import Latest
@@ -36,7 +44,7 @@ class Mishap(NamedTuple):
 
 TEXTS_KEPT = 64
 """Number of speeches whose words, and of events with speech, that are remembered."""
-Effect = ConnectionEvent | EventOutcome | TurnOutcome | Accepted | Refused | PersonForgotten | Mishap
+Effect = ConnectionEvent | Interjection | EventOutcome | TurnOutcome | Accepted | Refused | PersonForgotten | Mishap
 IDLE = "idle"
 DECISIONS: frozenset[EventState] = frozenset({"succeeded", "failed", "preempted", "withdrawn", "superseded"})
 DECIDED: frozenset[EventState] = DECISIONS | {"lost"}
@@ -168,6 +176,12 @@ class EventWriter:
                 )
             )  # fmt: skip
             event.request = ""
+
+    def interject(self, person: str, speech: Seconds, reading: InterjectionReading, at: Seconds) -> None:
+        """Tell what somebody says into the robot's turn. speech: its start."""
+        words, stamp = self.text_of(person, speech), self.stamp
+        told = Interjection(actor=person, since=stamp(speech), at=stamp(at), reading=reading, words=words)
+        self.effects.append(told)
 
     def understand(self, person: str, speech: Seconds, text: str, at: Seconds) -> None:
         """Take the words of a speech, known at `at`. Events that consist of it are told again if they have others."""

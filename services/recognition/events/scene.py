@@ -148,6 +148,8 @@ class SessionScene:
         """Blocks under way that the robot has announced as backchannels: they answer nobody."""
         self.speech = 0
         """Number of times that speech of any actor has begun or ended."""
+        self.floor_changes = 0
+        """Number of times that speech of any actor has begun or ended, or that its addressees became known."""
         self._fell_silent: list[tuple[Seconds, str]] = []
         """The two actors that fell silent last. Two are enough: the actor that asks is at most one of them."""
 
@@ -185,6 +187,7 @@ class SessionScene:
 
     def note_spoken(self, spoken: Spoken) -> None:
         """Remember a speech whose addressees are known now."""
+        self.floor_changes += 1
         self.spoken = [*self.spoken[1 - SPOKEN_KEPT :], spoken]
 
     def robot_speaks_to(self, person: str) -> bool:
@@ -221,6 +224,7 @@ class SessionScene:
     def speaks(self, actor: str) -> None:
         self._speakers.add(actor)
         self.speech += 1
+        self.floor_changes += 1
 
     def falls_silent(self, actor: str, at: Seconds) -> None:
         if actor in self._speakers:
@@ -228,6 +232,7 @@ class SessionScene:
             others = [one for one in self._fell_silent if one[1] != actor]
             self._fell_silent = sorted((*others, (at, actor)))[-2:]
             self.speech += 1
+            self.floor_changes += 1
 
     def stops(self, actor: str, at: Seconds) -> None:
         """End what the actor says and manipulates, because it has gone or is not followed any longer."""

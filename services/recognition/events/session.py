@@ -96,6 +96,15 @@ class Session:
         """True if more than one person is here."""
         return len(self.scene.company("")) > 1
 
+    def floor(self) -> list[tuple[str, Seconds, Addressees]]:
+        """All speeches that go on, the first first: who speaks, since when, and to whom (empty: not known yet)."""
+        said = self.scene.robot_spoken
+        speeches = [] if said is None else [(self.robot, said.since, said.to - EVERYBODY)]
+        for person in self.persons.values():
+            if person.presence.here and person.talk.speaks_since is not None:
+                speeches.append((person.id, person.talk.speaks_since, person.talk.speaks_to))
+        return sorted(speeches, key=lambda each: (each[1], each[0]))
+
     def contacts(self) -> dict[str, Probability | None]:
         """How much of a contact there is with each for whom it may have changed since the last call."""
         touched, self._people.touched = self._people.touched, set()

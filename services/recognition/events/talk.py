@@ -13,6 +13,7 @@ from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.addressing import (
+    NOBODY,
     Addressees,
     FaceTimes,
     OwnSpeech,
@@ -40,6 +41,7 @@ class Talk:
     def __init__(self, id: str, scene: SessionScene, config: RecognitionConfig, writer: EventWriter) -> None:
         self.id = id
         self._scene = scene
+        self._writer = writer
         self._conversation = Conversation(id, scene, config, writer, robot_speaks=scene.robot_speaks_to(id))
         self._line: deque[tuple[Seconds, Step | OwnSpeech]] = deque()
         """What is not told yet, with its times. The first is a speech of which it is not known to whom it is."""
@@ -53,9 +55,14 @@ class Talk:
         return None if self._speech is None else self._speech.since
 
     @property
+    def speaks_to(self) -> Addressees:
+        """To whom the speech that goes on is; empty: that is not known, or there is none."""
+        return NOBODY if self._speech is None or self._speech.to is None else self._speech.to
+
+    @property
     def speaks_to_robot(self) -> bool:
         """True while the person says something that is known to be for the robot."""
-        return self._speech is not None and self._scene.robot in (self._speech.to or ())
+        return self._scene.robot in self.speaks_to
 
     @property
     def question(self) -> Question | None:
@@ -99,7 +106,10 @@ class Talk:
         """Take the beginning of a speech. face: whose face the person looks at."""
         self._speech = speech = OwnSpeech(at, confidence, FaceTimes(at, face))
         speech.told = self._scene.told_addressees.get((self.id, at))
-        self._find(speech, face)
+        self._find(speech, face, at)
+        if self._conversation.robot_holds_floor:
+            self._writer.interject(self.id, at, "open", at)
+            speech.is_interjected = True
         self._queue(at, speech)
 
     def falls_silent(self, at: Seconds) -> None:
@@ -128,9 +138,9 @@ class Talk:
         """Take an action that goes on, known only now, at `at`. It has been decided by the looks of now to whom."""
         if action == "speak":
             self._speech = speech = OwnSpeech(since, confidence, FaceTimes(since, face))
-            if not self._find(speech, face):
+            if not self._find(speech, face, at):
                 speech.faces.turns(face, at)
-                self._address(speech, likely(speech, self.id, self._scene.spoken))
+                self._address(speech, likely(speech, self.id, self._scene.spoken), at)
             if self._scene.robot not in (speech.to or ()):
                 return
         self.take(at, lambda talk: talk.goes_on(action, since, confidence))
@@ -140,8 +150,8 @@ class Talk:
         for speech in self._unknown:
             if speech.since == since:
                 speech.words, speech.told = words or speech.words, told or speech.told
-                self._find(speech, "")
-        self.take(at, lambda talk: talk.understand(since))
+                self._find(speech, "", at)
+        self.take(at, lambda talk: talk.understand(since, at))
         self._go_on(at)
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
@@ -170,7 +180,7 @@ class Talk:
     def _unknown(self) -> list[OwnSpeech]:
         return [each for _, each in self._line if isinstance(each, OwnSpeech) and each.to is None]
 
-    def _find(self, speech: OwnSpeech, face: str) -> bool:
+    def _find(self, speech: OwnSpeech, face: str, at: Seconds) -> bool:
         """Decide to whom the speech is if that is certain. face: whose face the person looks at."""
         company = self._scene.company(self.id)
         is_line = self._scene.lines.get(self.id) == speech.since
@@ -178,11 +188,13 @@ class Talk:
         if to is None and face == self._scene.robot and not self._line and self._conversation.is_spoken_to:
             to = frozenset((face,))  # who has been asked, and looks at who has asked, answers
         if to is not None:
-            self._address(speech, to)
+            self._address(speech, to, at)
         return to is not None
 
-    def _address(self, speech: OwnSpeech, to: Addressees) -> None:
+    def _address(self, speech: OwnSpeech, to: Addressees, at: Seconds) -> None:
         speech.to = to
+        if speech.is_interjected and self._scene.robot not in to:
+            self._writer.interject(self.id, speech.since, "other", at)
         speech.spoken = Spoken(self.id, to, speech.since, speech.until)
         self._scene.note_spoken(speech.spoken)
 
@@ -197,7 +209,7 @@ class Talk:
         _, speech = self._line[0]
         assert isinstance(speech, OwnSpeech)
         speech.faces.turns(speech.faces.face, at)
-        self._address(speech, likely(speech, self.id, self._scene.spoken))
+        self._address(speech, likely(speech, self.id, self._scene.spoken), at)
         self._go_on(at)
 
     def _go_on(self, now: Seconds) -> None:
