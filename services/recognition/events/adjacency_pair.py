@@ -15,6 +15,7 @@ from engage_hri.services.recognition.events.machine import (
     TransitionRow,
     table,
 )
+from engage_hri.services.recognition.events.presence import NEVER
 from engage_hri.services.recognition.events.scene import Question
 
 ROBOT_WAITING, HUMAN_WAITING = "robot_waiting", "human_waiting"
@@ -180,6 +181,11 @@ class AdjacencyPair(Machine):
             self.step("withdraw", at)
 
     @property
+    def asked_until(self) -> Seconds:
+        """End of the person's turn that waits for an answer; if none does, before all times."""
+        return self._turn_end if self.state == HUMAN_WAITING and self._turn_end is not None else NEVER
+
+    @property
     def question(self) -> Question | None:
         """The robot's question that waits for an answer, its turn being over; None: none does."""
         if self.state != ROBOT_WAITING or self._turn_end is None or self.event is None or self.deadline is None:
@@ -200,9 +206,7 @@ class AdjacencyPair(Machine):
         return self.event is not None and self.state == ROBOT_WAITING and action in self.event.accept
 
     def human_begins(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> bool:
-        """Take a person's action as the answer to the robot's turn. False if it is none."""
-        if self._answers_late(action, at, confidence):
-            return True
+        """Take a person's action as the answer to the robot's turn, in time. False if it is none."""
         is_first = self.may_be_answered_with(action)
         if self.event is None or not (is_first or self._is_earlier_answer(action, at)):
             return False
@@ -214,7 +218,7 @@ class AdjacencyPair(Machine):
             self.event.response, self._response_since, self._response_until = action, at, None
         return True
 
-    def _answers_late(self, action: Action, at: Seconds, confidence: Probability) -> bool:
+    def answers_late(self, action: Action, at: Seconds, confidence: Probability) -> bool:
         """Take the first accepted action after the limit as the answer of the pair that failed, late.
 
         The pair stays failed, for its limit is what it was judged by; it is told again with the answer and its delay.

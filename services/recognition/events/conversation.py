@@ -78,10 +78,13 @@ class Conversation:
 
     @property
     def _pair_deadline(self) -> Seconds | None:
-        """Deadline of the pair; None while speech that began in time may yet turn out to be the answer."""
+        """Deadline of the pair; None while speech of anybody that began in time may yet turn out to be the answer."""
         at, speeches = self.pair.deadline, self._sign.speeches if self._sign is not None else []
         began_in_time = at is not None and any(in_time(speech.since, at) for speech in speeches)
-        return None if began_in_time and self.pair.may_be_answered_with("speak") else at
+        if began_in_time and self.pair.may_be_answered_with("speak"):
+            return None
+        question = self.pair.question
+        return None if question is not None and self._scene.may_be_answered(self.id, question.until) else at
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         for pair in self._pairs():
@@ -132,8 +135,8 @@ class Conversation:
         """Take a nod, a shake or a point of the person."""
         if self.robot_holds_floor:
             self._signs(action, at, confidence)
-        else:
-            self.pair.human_begins(action, at, confidence)
+        elif not self.pair.human_begins(action, at, confidence):
+            self.pair.answers_late(action, at, confidence)
 
     def gesture_ends(self, action: Action, at: Seconds) -> None:
         self._ends(action, at, by_robot=False)
@@ -264,18 +267,22 @@ class Conversation:
             self.acts_since = since
         if self.pair.event is None or since < self.pair.event.started:
             return
-        if not self.pair.human_begins(action, since, confidence) and action in ("speak", "act"):
-            self.pair.human_goes_on(action, since)
+        pair = self.pair
+        is_answer = pair.human_begins(action, since, confidence) or pair.answers_late(action, since, confidence)
+        if not is_answer and action in ("speak", "act"):
+            pair.human_goes_on(action, since)
 
     def _human_turn(self, at: Seconds, action: Action, confidence: Probability) -> None:
         """Take speech that is no backchannel, or a manipulation: an answer, more of a turn, or a first turn."""
         pair = self.pair
-        if pair.human_begins(action, at, confidence) or pair.human_goes_on(action, at):
+        if pair.human_begins(action, at, confidence):
+            pass
+        elif self._scene.answers_for_another(self.id, action, at, after=pair.asked_until):
+            pair.forget_unanswered()
+        elif pair.answers_late(action, at, confidence) or pair.human_goes_on(action, at):
             pass
         elif action == "speak" and pair.is_third_turn(self.id, at):
             pair.third_turn(at)
-        elif self._scene.answers_for_another(self.id, action, at):
-            pass
         elif pair.state == IDLE:
             event = OngoingEvent(
                 kind="adjacency_pair", initiator=self.id, responder=self._scene.robot, started=at,

@@ -28,6 +28,8 @@ class People:
         self._unseen: dict[str, Seconds] = {}
         """Time of the last sign of each person who has gone or is not reported as present. The longest ago first."""
         self._met = 0
+        self._unknown: dict[str, Seconds] = {}
+        """`scene.unknown` when the deadlines of those who were asked were last updated."""
         self.touched: set[str] = set()
         """Persons whose contact with the robot may have changed since somebody emptied this."""
         self._speech = 0
@@ -131,7 +133,11 @@ class People:
         self._follow_speech(at)
 
     def _follow_answers(self, at: Seconds) -> None:
-        """Tell those who were asked that somebody else has answered in their place."""
+        """Tell those who were asked that somebody else has answered in their place, or may yet do so."""
+        if self._unknown != self._scene.unknown:
+            self._unknown = {**self._scene.unknown}
+            for id in [*self._scene.questions]:
+                self._update(self.persons[id])
         while self._scene.taken_up:
             taken_up = self._scene.taken_up.pop()
             if taken_up.asked in self.persons:

@@ -93,8 +93,11 @@ class PersonRecognition:
         yield from ((one.until, self._goes_on_too_long) for one in self._doing.values())
 
     def pass_time(self, at: Seconds) -> None:
-        """Take the first step that is due at `at`, the deadline."""
-        next(step for due, step in self._timed_steps if due == at)(at)
+        """Take the first step that is due at `at`. There is none if something that all share has put it off."""
+        for due, step in self._timed_steps:
+            if due == at:
+                step(at)
+                return
 
     @property
     def _look_directs_at(self) -> Seconds | None:

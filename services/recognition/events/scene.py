@@ -142,6 +142,8 @@ class SessionScene:
         """The latest speeches whose addressees are known, of all."""
         self.questions: dict[str, Question] = {}
         """Questions of the robot that wait for an answer, by the person who was asked."""
+        self.unknown: dict[str, Seconds] = {}
+        """Start of the first speech of each person of which it is not known yet to whom it is."""
         self.taken_up: list[TakenUp] = []
         """Answers to them by somebody else, which the person who was asked has yet to be told of."""
         self.listening_blocks: Latest[str, None] = Latest(BLOCKS_KEPT)
@@ -194,15 +196,18 @@ class SessionScene:
         """True while the robot speaks to this person, or to nobody known."""
         return self.robot_spoken is not None and self.robot_spoken.is_to(person)
 
-    def answers_for_another(self, person: str, action: Action, at: Seconds) -> bool:
+    def answers_for_another(self, person: str, action: Action, at: Seconds, *, after: Seconds) -> bool:
         """Take what a person says to the robot as the answer to a question that the robot has asked somebody else.
 
-        False if it is none: no such question waits. Of several the latest is answered.
+        False if it is none: no such question waits that was asked after `after`. Of several the latest is answered.
         """
         waiting = [
             (question.since, asked)
             for asked, question in self.questions.items()
-            if asked != person and action in question.accept and question.since <= at and in_time(at, question.until)
+            if asked != person
+            and action in question.accept
+            and after < question.since <= at
+            and in_time(at, question.until)
         ]
         if not waiting:
             return False
@@ -210,6 +215,10 @@ class SessionScene:
         del self.questions[asked]
         self.taken_up.append(TakenUp(asked, person, action, at))
         return True
+
+    def may_be_answered(self, person: str, until: Seconds) -> bool:
+        """True if somebody else has begun to speak by then, of whom it is not known yet to whom it is."""
+        return any(who != person and in_time(since, until) for who, since in self.unknown.items())
 
     def robot_falls_silent(self, at: Seconds) -> None:
         if self.robot_spoken is not None:

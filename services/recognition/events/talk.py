@@ -180,6 +180,13 @@ class Talk:
     def _unknown(self) -> list[OwnSpeech]:
         return [each for _, each in self._line if isinstance(each, OwnSpeech) and each.to is None]
 
+    def _note_unknown(self) -> None:
+        """Let the others know whether a speech waits whose addressees may turn out to be theirs."""
+        if self._line:
+            self._scene.unknown[self.id] = self._line[0][0]
+        else:
+            self._scene.unknown.pop(self.id, None)
+
     def _find(self, speech: OwnSpeech, face: str, at: Seconds) -> bool:
         """Decide to whom the speech is if that is certain. face: whose face the person looks at."""
         company = self._scene.company(self.id)
@@ -201,31 +208,37 @@ class Talk:
     def _queue(self, at: Seconds, speech: OwnSpeech) -> None:
         if self._line or speech.to is None:
             self._line.append((at, speech))
+            self._note_unknown()
         elif self._scene.robot in speech.to:
             self._conversation.speaks(at, speech.confidence)
 
     def _decide(self, at: Seconds) -> None:
-        """Decide to whom the first speech in line is, by what is likely."""
+        """Decide to whom the first speech in line is, and tell what waits for that."""
         _, speech = self._line[0]
         assert isinstance(speech, OwnSpeech)
+        self._likely(speech, at)
+        self._go_on(at)
+
+    def _likely(self, speech: OwnSpeech, at: Seconds) -> None:
+        """Decide to whom a speech is by what is likely."""
         speech.faces.turns(speech.faces.face, at)
         self._address(speech, likely(speech, self.id, self._scene.spoken), at)
-        self._go_on(at)
 
     def _go_on(self, now: Seconds) -> None:
         """Tell all in line up to the next speech of which it is not known to whom it is."""
         while self._line:
             at, item = self._line[0]
             if isinstance(item, OwnSpeech) and item.to is None:
-                if self._decided_at is not None and self._decided_at <= now:
-                    self._decide(now)
-                return
+                if self._decided_at is None or self._decided_at > now:
+                    break
+                self._likely(item, now)
             self._line.popleft()
             self._catch_up(at)
             if not isinstance(item, OwnSpeech):
                 item(self._conversation)
             elif self._scene.robot in (item.to or ()):
                 self._conversation.speaks(at, item.confidence)
+        self._note_unknown()
 
     def _catch_up(self, until: Seconds) -> None:
         """Take the steps of the conversation that were due before `until`."""
