@@ -29,9 +29,9 @@ LONGEST_UNKNOWN: Seconds = 3.0
 """Time after which it is decided to whom a speech is that still goes on, by the looks so far. Ours."""
 ADDRESSEES_WAIT: Seconds = 1.0
 """Time after a speech for which perception is waited for that tells to whom people speak. Ours."""
-LONGEST_UNTOLD: Seconds = 10.0
-"""As `LONGEST_UNKNOWN`, where perception tells addressees: it may do so only with the words. Less than the time for
-which the realizer waits for the decision of a pair after its limit. Ours."""
+LONGEST_UNTOLD: Seconds = 60.0
+"""As `LONGEST_UNKNOWN`, where perception tells addressees: it may do so only with the words, when the speech is over.
+No speech is longer (`LONGEST_SPEECH`). Ours."""
 Step = Callable[[Conversation], object]
 
 
