@@ -11,8 +11,8 @@ from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.services.control.contract.body import AbortMode, Body, Spoke
+from engage_hri.services.control.testing.findings import OLD_READINGS, broken, degrees, listed, ms
 from engage_hri.services.control.testing.holding import NOTHING, is_movement
-from engage_hri.services.control.testing.laws import OLD_READINGS, broken, degrees, listed, ms
 from engage_hri.services.control.testing.motions import Recording, Violation, recorded, violations
 from engage_hri.services.control.testing.stage import PATIENCE, Connection, Stage, standing, still_running
 from engage_hri.services.control.testing.suite import Suite, by_each, does_not_apply, trials

@@ -9,7 +9,7 @@ from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.body import Arrived, Body, MovementAuthority, Progress, Reached, Revocation
-from engage_hri.services.control.testing.laws import NEVER_ENDS, broken, listed, ms
+from engage_hri.services.control.testing.findings import NEVER_ENDS, broken, listed, ms
 
 PATIENCE: Seconds = 30.0
 """Time within which any behavior comes to its next hold point, or to its end."""
