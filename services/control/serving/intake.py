@@ -34,7 +34,6 @@ from collections.abc import Mapping
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, OngoingActions
 from engage_hri.schemas.behaviors import (
     Action,
     BlockBehavior,
@@ -45,6 +44,7 @@ from engage_hri.schemas.behaviors import (
     Pointing,
     Speech,
 )
+from engage_hri.schemas.blocks import BodyHeld, Hold
 from engage_hri.schemas.body import (
     AbortBehavior,
     BehaviorAborted,
@@ -59,13 +59,12 @@ from engage_hri.schemas.body import (
     WordSpoken,
 )
 from engage_hri.schemas.body_faults import BodyFault, BodyFaults, FaultsSwitched, SwitchFaults, flaw, switched
-from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.holds import BodyHeld, Hold
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, OngoingActions
 from engage_hri.schemas.requests import Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.schemas.world import World
+from engage_hri.schemas.world import COVERED_FOR, CoveredObjects, World
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.body import AbortMode, Arrived, Progress, Reached, Revocation, Spoke
 from engage_hri.services.control.contract.refusals import refusal

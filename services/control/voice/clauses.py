@@ -20,7 +20,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from engage_hri.schemas.speakable import Token, tokens
+from engage_hri.schemas.text import Token, tokens
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.body import MouthShape
 from engage_hri.services.control.voice.lips import lips, loud

@@ -17,7 +17,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Speech, Wait
-from engage_hri.schemas.speakable import tokens
+from engage_hri.schemas.text import tokens
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.bell import EARLY, Bell
 from engage_hri.services.control.contract.body import (
