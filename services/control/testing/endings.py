@@ -241,11 +241,10 @@ class EndingLaws(Suite):
                     advice="are the motors asked often enough, and is it the newest reading that `angles` tells?",
                     cause=OLD_READINGS,
                 )
-            unit = each.unit.removeprefix("degrees")
             when = each.at - recording.times[0]
             broken(
-                expected=f"{each.what} of {each.joint} up to {degrees(each.limit)}{unit}",
-                measured=f"{degrees(each.measured)}{unit}, {ms(when)} after it was asked for",
+                expected=f"{each.what} of {each.joint} up to {degrees(each.limit)}{each.unit}",
+                measured=f"{degrees(each.measured)}{each.unit}, {ms(when)} after it was asked for",
                 advice=_encoders(each) if each.what != "range" else "",
             )
 

@@ -75,7 +75,7 @@ class LookingLaws(Suite):
                 return moved
         return None
 
-    @by_each(lambda each: isinstance(each, Gaze | GazeShift), "no looks")
+    @by_each(Gaze | GazeShift, "no looks")
     async def test_says_what_it_looks_at(self, body: Body, behavior: BlockBehavior) -> None:
         """`looking_at` is the target once the eyes are on it, and never anything that the eyes are not on.
 

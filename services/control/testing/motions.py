@@ -46,12 +46,8 @@ class Violation(Struct, frozen=True, kw_only=True):
 
     @property
     def unit(self) -> str:
-        """Unit of the two numbers in words, once they are in degrees."""
-        return {"range": "degrees", "speed": "degrees/s", "acceleration": "degrees/s^2"}[self.what]
-
-    def __str__(self) -> str:
-        measured, limit = math.degrees(self.measured), math.degrees(self.limit)
-        return f"{self.joint}: {self.what} {measured:.1f} {self.unit}, its limit is {limit:.1f}"
+        """End of the unit of the two numbers, behind `degrees`."""
+        return {"range": "", "speed": "/s", "acceleration": "/s^2"}[self.what]
 
 
 class Recording:

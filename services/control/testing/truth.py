@@ -47,6 +47,7 @@ from engage_hri.services.control.testing.stage import (
     LOOK_EVERY,
     PATIENCE,
     Stage,
+    default,
     done,
     standing,
     target_point,
@@ -157,15 +158,11 @@ class Witness:
                 return self._hands(state, mode, is_away=False)
         return None
 
-    @property
-    def _near(self) -> Radians:
-        return self.suite.accuracy + self.suite.gaze_slack
-
     def _looks_at(self, gaze: Ray | None, target: str) -> Untrue | None:
         off = aside(gaze, self.suite.position(target)) if gaze else 0.0
-        if off <= self._near:
+        if off <= self.suite.near:
             return None
-        return f"eyes on {target}, within {degrees(self._near)}", f"{degrees(off)} beside it"
+        return f"eyes on {target}, within {degrees(self.suite.near)}", f"{degrees(off)} beside it"
 
     def _is_at_base(self, gaze: Ray | None) -> Untrue | None:
         if self.base is None:
@@ -174,9 +171,9 @@ class Witness:
 
     def _is_as_at_rest(self, gaze: Ray | None) -> Untrue | None:
         off = angle(gaze.axis, self.rest.gaze.axis) if gaze and self.rest.gaze else 0.0
-        if off <= self._near:
+        if off <= self.suite.near:
             return None
-        return f"the head where it was, within {degrees(self._near)}", f"{degrees(off)} away"
+        return f"the head where it was, within {degrees(self.suite.near)}", f"{degrees(off)} away"
 
     def _has_nodded(self, state: BodyState) -> Untrue | None:
         if state.gaze and self.rest.gaze:
@@ -260,7 +257,7 @@ class Witness:
         return self.lies
 
     def _check_end(self, stage: "WatchedStage") -> None:
-        told = tuple(sync for sync in stage.passed if not sync.startswith("stroke:"))
+        told = default(stage.passed)
         points, how = sync_points(stage.behavior), stage.authority.revoked
         if told != points[: len(told)]:
             self._note(stage.behavior, "", f"points in order: {', '.join(points)}", ", ".join(told))
