@@ -36,7 +36,7 @@ from engage_hri.services.console import nets, view, wording
 from engage_hri.services.console.web import scene
 from engage_hri.services.console.web.health import HealthBoard
 from engage_hri.services.console.web.lanes import BlockLanes, EventLanes, Measures
-from engage_hri.services.console.web.looking import plainly
+from engage_hri.services.console.web.scene import plainly
 from engage_hri.services.console.web.sections import Choice, HeadSection, Note, Switched, UtteranceShown
 from engage_hri.services.console.web.turns import ShownTurns
 from engage_hri.services.runtime.absent import Acquaintances

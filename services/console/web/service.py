@@ -19,8 +19,8 @@ from engage_hri.services.bus.interface import Bus, Hub, Subscription
 from engage_hri.services.client.robot import Robot
 from engage_hri.services.console.follow import FOLLOWED, following
 from engage_hri.services.console.web.health import NOTABLE
+from engage_hri.services.console.web.orders import Script
 from engage_hri.services.console.web.picture import Picture
-from engage_hri.services.console.web.script import Script
 from engage_hri.services.console.web.seats import Invitation, Seats, invitation
 
 PATTERNS = (
