@@ -8,28 +8,8 @@ block: `deeds` makes words of it.
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.behavior_types import TYPES, dialect_sync, same_instant
-from engage_hri.schemas.behaviors import (
-    Action,
-    Behavior,
-    EventKind,
-    Expression,
-    Face,
-    FaceFacs,
-    FaceLexeme,
-    FaceShift,
-    Gaze,
-    GazeShift,
-    Gesture,
-    Hand,
-    Head,
-    Locomotion,
-    Pose,
-    Posture,
-    PostureShift,
-    expressed,
-    posed,
-)
 from engage_hri.schemas.blocks import Block, Hold, WarningFeedback
 from engage_hri.schemas.fragments import Claim, TurnFragment
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
@@ -37,7 +17,7 @@ from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.vocabulary import normal
 
-KINDS: dict[EventKind, str] = {
+KINDS: dict[of.EventKind, str] = {
     "directed_gaze": "directed gaze",
     "mutual_facial_gaze": "mutual facial gaze",
     "adjacency_pair": "adjacency pair",
@@ -68,7 +48,7 @@ def clock(value: Seconds) -> str:
     return f"{int(minutes)}:{rest:04.1f}"
 
 
-VERBS: dict[Action, tuple[str, str]] = {
+VERBS: dict[of.Action, tuple[str, str]] = {
     "look": ("looks", "at "),
     "point": ("points", "at "),
     "nod": ("nods", "to "),
@@ -78,7 +58,7 @@ VERBS: dict[Action, tuple[str, str]] = {
 }
 
 
-def action_words(action: Action, targets: Sequence[str], robot: str) -> tuple[str, str]:
+def action_words(action: of.Action, targets: Sequence[str], robot: str) -> tuple[str, str]:
     """Words for an action and its targets: `looks`, `at the robot`.
 
     A look without targets is a look away; other actions without targets have no words for them.
@@ -139,7 +119,7 @@ ACTIONS = ("NOD", "SHAKE")
 
 LACKS, NEAR = "this body has no", ", as near as it can"
 """Words of a warning of the body that performs something near, which it names itself, and those for the deed."""
-HANDS: Mapping[Hand, str] = {
+HANDS: Mapping[of.Hand, str] = {
     "LEFT_HAND": " with the left hand", "RIGHT_HAND": " with the right hand", "BOTH_HANDS": " with both hands",
 }  # fmt: skip
 
@@ -169,30 +149,30 @@ def deeds(thing: Block | TurnFragment) -> dict[tuple[str, str], Deed]:
     return found
 
 
-def _words(behavior: Behavior) -> str:
+def _words(behavior: of.Behavior) -> str:
     """Say what the robot does; empty: actions tell of it, or there is nothing to see."""
     match behavior:
-        case Gesture(lexeme=lexeme, mode=mode):
+        case of.Gesture(lexeme=lexeme, mode=mode):
             return f"makes the gesture {lexeme}{HANDS[mode] if mode else ''}"
-        case Head(lexeme=lexeme) if normal(lexeme) not in ACTIONS:
+        case of.Head(lexeme=lexeme) if normal(lexeme) not in ACTIONS:
             return f"moves the head: {lexeme}"
-        case Face() | FaceLexeme() | FaceFacs() | FaceShift():
-            shown = " and ".join(filter(None, map(_expression, expressed(behavior))))
+        case of.Face() | of.FaceLexeme() | of.FaceFacs() | of.FaceShift():
+            shown = " and ".join(filter(None, map(_expression, of.expressed(behavior))))
             return f"shows the face {shown}" if shown else ""
-        case Posture() | PostureShift():
-            poses = [" ".join(filter(None, (each.lexeme, each.part))) for each in posed(behavior)]
+        case of.Posture() | of.PostureShift():
+            poses = [" ".join(filter(None, (each.lexeme, each.part))) for each in of.posed(behavior)]
             taken = " and ".join(filter(None, (behavior.stance, *poses)))
             return f"takes the posture {taken}" if taken else ""
-        case Pose(lexeme=lexeme, part=part):
+        case of.Pose(lexeme=lexeme, part=part):
             return f"takes the pose {' '.join(filter(None, (lexeme, part)))}"
-        case Gaze() | GazeShift() if behavior.offset_angle:
+        case of.Gaze() | of.GazeShift() if behavior.offset_angle:
             direction = f" {behavior.offset_direction}" if behavior.offset_direction else ""
             return f"looks {behavior.offset_angle:g}°{direction} of {behavior.target}"
-        case Locomotion(target=target):
+        case of.Locomotion(target=target):
             return f"moves to {target}"
     return ""
 
 
-def _expression(shown: Expression) -> str:
+def _expression(shown: of.Expression) -> str:
     name = shown.lexeme or (f"AU {shown.au}" if shown.au else "")
     return f"{name} {shown.side.lower()}" if name and shown.side != "BOTH" else name
