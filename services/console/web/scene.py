@@ -19,33 +19,27 @@ from engage_hri.schemas.fragments import Claim, ClaimKind
 from engage_hri.schemas.units import Meters, Radians, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.console.view import Actor, Scene
-from engage_hri.services.console.web.sections import (
-    Above,
-    Arm,
-    BodyShown,
-    ClaimShown,
-    PersonShown,
-    SceneSection,
-    Thing,
-)
+from engage_hri.services.console.web import sections
 
 HALF_ANGLE: Radians = 0.1
 """Half the angle of the gaze cone of a body that has not said its own."""
 
 
-def section(scene: Scene, world: World | None, state: RobotState | None, body: Capabilities | None) -> SceneSection:
+def section(
+    scene: Scene, world: World | None, state: RobotState | None, body: Capabilities | None
+) -> sections.SceneSection:
     """Everything that is seen in space. world, state, body: None: nothing was told of it yet."""
     entities = world.entities if world is not None else ()
     people = {entity.id: entity.position for entity in entities if entity.kind == "person"}
     actors = [actor.id for actor in scene.actors.values() if actor.id != scene.robot and actor.present]
     shown = tuple(_person(scene.actor(id), people.get(id)) for id in dict.fromkeys((*people, *actors)))
     edges = _frame(entities, [each.at for each in shown if each.at is not None and each.present])
-    return SceneSection(
+    return sections.SceneSection(
         robot=scene.robot,
         body=_body(state, scene.actor(scene.robot), body) if state is not None else None,
         things=tuple(_thing(entity) for entity in entities if entity.kind != "person"),
         people=shown,
-        above=Above(RIGHT, DOWN, PictureEdges(*map(_short, edges))),
+        above=sections.Above(RIGHT, DOWN, PictureEdges(*map(_short, edges))),
     )
 
 
@@ -54,20 +48,20 @@ def label(entity: Entity) -> str:
     return entity.name or " ".join(filter(None, (entity.color, entity.category or entity.shape))) or entity.id
 
 
-def _thing(entity: Entity) -> Thing:
+def _thing(entity: Entity) -> sections.Thing:
     outline = [(_short(x), _short(y)) for x, y in corners(entity)]
-    return Thing(
+    return sections.Thing(
         entity.id, entity.kind, _place(entity.position), _short(entity.yaw), tuple(outline), _short(entity.radius),
         entity.color, label(entity), entity.owner,
     )  # fmt: skip
 
 
-def _person(actor: Actor, at: Vector | None) -> PersonShown:
+def _person(actor: Actor, at: Vector | None) -> sections.PersonShown:
     def targets(action: str) -> tuple[str, ...]:
         return tuple(target for doing in actor.doing if doing.action == action for target in doing.targets)
 
     doing = {each.action for each in actor.doing}
-    return PersonShown(
+    return sections.PersonShown(
         id=actor.id, at=None if at is None else _place(at), present=actor.present,
         looks=actor.look.targets if actor.look is not None else None,
         points=targets("point"), acts=targets("act") or (("",) if "act" in doing else ()),
@@ -75,13 +69,13 @@ def _person(actor: Actor, at: Vector | None) -> PersonShown:
     )  # fmt: skip
 
 
-def _body(state: RobotState, actor: Actor, body: Capabilities | None) -> BodyShown:
+def _body(state: RobotState, actor: Actor, body: Capabilities | None) -> sections.BodyShown:
     arms = [
-        Arm(side, _place(ray.origin), _place(ray.tip or ray.origin))
+        sections.Arm(side, _place(ray.origin), _place(ray.tip or ray.origin))
         for side, ray in (("left", state.left_arm), ("right", state.right_arm))
         if ray is not None
     ]
-    return BodyShown(
+    return sections.BodyShown(
         eyes=_place(state.gaze.origin) if state.gaze else None,
         gaze=_place(state.gaze.axis) if state.gaze else None,
         spread=_short((body.gaze_half_angle if body else HALF_ANGLE) + (state.gaze.error if state.gaze else 0.0)),
@@ -230,9 +224,11 @@ KEPT = {
 SPEECH_ONLY = "speech only"
 
 
-def plainly(claim: Claim, world: World) -> ClaimShown:
+def plainly(claim: Claim, world: World) -> sections.ClaimShown:
     """A claim in plain words, with its terms."""
-    return ClaimShown(claim.kind, claim.priority, claim.target, claim.reason, _where(claim, world), _why(claim))
+    return sections.ClaimShown(
+        claim.kind, claim.priority, claim.target, claim.reason, _where(claim, world), _why(claim)
+    )
 
 
 def _where(claim: Claim, world: World) -> str:
