@@ -35,10 +35,6 @@ LOUD_ROBOT = 16 * 1024 * 1024
 """The same for all others. A service hands out that much when it is asked for its past."""
 MOST_PULSES = 20
 """Pulses of one process that a router passes on in a second. A process of ours sends one or two."""
-MOST_MESSAGES = 2000
-"""Messages of one process in a second from which on a router with keys tells of it. A service sends some 64."""
-MOST_QUESTIONS = 1000
-"""The same for questions. A service asks 90 in the second in which 40 clients come at once."""
 LONGEST_KEY = 2048
 """Bytes of a key: it may have two ids of 250 characters. Zenoh stops the link of one who sends 65 536 of them."""
 LONGEST_ENCODING = 255

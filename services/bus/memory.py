@@ -17,9 +17,9 @@ from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.status import BusHealth
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
-from engage_hri.services.bus.answering import Answering
 from engage_hri.services.bus.interface import (
     Answer,
+    Answering,
     Bus,
     Hub,
     Received,
@@ -27,7 +27,7 @@ from engage_hri.services.bus.interface import (
     Subscription,
     Tap,
 )
-from engage_hri.services.bus.payloads import LOCAL, read_payload
+from engage_hri.services.bus.samples import LOCAL, read_payload
 from engage_hri.services.bus.subscription import KEYS_KEPT, offer_presence
 
 

@@ -21,6 +21,7 @@ from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.bus.deadlines import FORGOTTEN_AFTER
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.people.perceive import perceive
@@ -33,7 +34,6 @@ from engage_hri.services.console.web.receipts import Receipts
 from engage_hri.services.console.web.script import Script
 from engage_hri.services.console.web.service import WindowServer, window
 from engage_hri.services.console.web.visitor import Visitor
-from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
 from engage_hri.services.runtime.service import running
 from tests.recording.runs import recording_to
 

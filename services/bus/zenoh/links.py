@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import zenoh
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.zenoh.session import LoopBridge
+from engage_hri.services.bus.zenoh.bridge import LoopBridge
 from engage_hri.services.bus.zenoh.volume import end, place
 
 SETTLE: Seconds = 1.0

@@ -17,8 +17,8 @@ from engage_hri.services.control.contract.calibration import Calibration
 from engage_hri.services.control.serving.estimates import IncomingEstimates
 from engage_hri.services.control.serving.intake import ControlIntake
 from engage_hri.services.control.serving.words_for_voice import estimate_of, spoken, spoken_items
+from engage_hri.services.runtime.loop import InTurns
 from engage_hri.services.runtime.steps import Steps
-from engage_hri.services.runtime.unhurried import InTurns
 
 
 class Questions:

@@ -22,7 +22,7 @@ import zenoh
 from engage_hri.schemas import access, keys
 from engage_hri.schemas.access import Holder
 from engage_hri.schemas.limits import BESIDE, most
-from engage_hri.services.bus.zenoh.crowd import MOST_TOKENS
+from engage_hri.services.bus.zenoh.router import MOST_TOKENS
 
 COMMAND = [sys.executable, "-m", "tests.rigs.attacker.attacks"]
 HUNDRED_MB = 100_000_000
