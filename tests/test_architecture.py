@@ -32,9 +32,8 @@ PURE_MACHINERY = {
     "services/requests/serving.py", "services/requests/serving_table.py",
     "services/runtime/again.py", "services/runtime/installation.py", "services/runtime/intake.py",
     "services/runtime/steps.py",
-    "services/client/chunking.py", "services/client/event_stream.py", "services/client/people/person_actions.py",
-    "services/client/people/shared_world.py", "services/client/people/utterances.py",
-    "services/bus/deadlines.py", "services/bus/samples.py",
+    "services/client/chunking.py", "services/client/event_stream.py", "services/client/people/actions.py",
+    "services/client/people/shared_world.py", "services/bus/deadlines.py", "services/bus/samples.py",
 }  # fmt: skip
 """Files of these packages that are pure themselves."""
 VISITOR = "examples/plain_zenoh_events.py"
@@ -61,8 +60,7 @@ LAYERS = {
     "services/control": "mujoco > reachy_mini service testing torso > bases calibrating serving > figure voice"
     " > contract > config motion",
     "services/commandline": "look robot study talk > app bodies embedding > shell",
-    "services/client": "language_models > robot > orders > feeds people > chunking event_stream hearing inputs"
-    " results",
+    "services/client": "language_models > robot > orders > feeds people > chunking event_stream inputs",
     "services/generation": "service > intake > fragments > performance > body_link choosing_again ways > exchange"
     " fragment_check > acts lost pipeline > block head names > references turns > permits > config",
     "services/realizer": "service > perform > export together > report > decide > foresee > plan > net"

@@ -13,11 +13,10 @@ from msgspec import Struct
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.body_faults import BodyFault, SwitchFaults
-from engage_hri.schemas.covered import COVERED_FOR
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.requests import Request
 from engage_hri.schemas.units import Seconds
-from engage_hri.schemas.world import World
+from engage_hri.schemas.world import COVERED_FOR, World
 from engage_hri.services.bus.interface import Bus, Received, is_asked_to_stop
 from engage_hri.services.control.bases.drivers import made, with_settings_of_drivers
 from engage_hri.services.control.config import ControlConfig

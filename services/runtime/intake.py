@@ -19,8 +19,8 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.ledger import ReadClock, Step
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.participants import ReadClock, Step
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.samples import Received
 

@@ -9,8 +9,8 @@ import re
 from collections import Counter
 from collections.abc import Callable
 
-from engage_hri.schemas.limits import LONGEST_KEY
-from engage_hri.schemas.utf8 import printable
+from engage_hri.schemas.access import LONGEST_KEY
+from engage_hri.schemas.text import printable
 from engage_hri.services.bus.samples import is_told
 
 LEVELS = (

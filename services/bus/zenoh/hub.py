@@ -22,7 +22,7 @@ import zenoh
 from engage_hri.schemas import access, keys
 from engage_hri.schemas.faults import Fault, NotReady
 from engage_hri.schemas.messages import Message, published
-from engage_hri.schemas.status import BusHealth, ProcessFacts
+from engage_hri.schemas.participants import BusHealth, ProcessFacts
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.config import Mode, is_on_this_machine, mode_of
 from engage_hri.services.bus.interface import LOG, Answer, Answering, Bus, Hub, Subscription, Tap

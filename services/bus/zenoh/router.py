@@ -14,10 +14,9 @@ from typing import Any
 import zenoh
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.access import Holder
-from engage_hri.schemas.limits import LOUD
+from engage_hri.schemas.access import LOUD, Holder
+from engage_hri.schemas.text import printable
 from engage_hri.schemas.units import Seconds
-from engage_hri.schemas.utf8 import printable
 from engage_hri.services.bus.interface import LOG
 from engage_hri.services.bus.keyring import Expiry, Keys
 from engage_hri.services.bus.zenoh.bridge import LoopBridge

@@ -10,8 +10,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 from engage_hri.schemas import access, keys
-from engage_hri.schemas.access import OWN, ROUTER, Holder, owned
-from engage_hri.schemas.limits import BESIDE, LARGEST, MOST_PULSES, most
+from engage_hri.schemas.access import BESIDE, LARGEST, MOST_PULSES, OWN, ROUTER, Holder, most, owned
 
 EVERY_KIND = (
     "put", "delete", "declare_subscriber", "query", "reply", "declare_queryable",

@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import Action, BlockBehavior, Head, Pointing, Speech
+from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.control.contract.body import Reached
 

@@ -32,8 +32,8 @@ What went wrong where each of them decided for itself:
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import OngoingActions
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift
+from engage_hri.schemas.blocks import BodyHeld, Hold
 from engage_hri.schemas.body import (
     AbortBehavior,
     BehaviorAborted,
@@ -48,13 +48,12 @@ from engage_hri.schemas.body import (
     WordSpoken,
 )
 from engage_hri.schemas.body_faults import BodyFault, BodyFaults, FaultsSwitched, SwitchFaults, flaw, switched
-from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.holds import BodyHeld, Hold
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import OngoingActions
 from engage_hri.schemas.requests import Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.schemas.world import World
+from engage_hri.schemas.world import COVERED_FOR, CoveredObjects, World
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.body import AbortMode, Arrived, Progress, Reached, Revocation, Spoke
 from engage_hri.services.control.contract.refusals import refusal

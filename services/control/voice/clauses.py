@@ -19,7 +19,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from engage_hri.schemas.speakable import Token, tokens
+from engage_hri.schemas.text import Token, tokens
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.voice.synthesis import Heard, Phrase, Said, Synthesizer, refused
 from engage_hri.services.control.voice.timeline import PAUSE, Word, natural

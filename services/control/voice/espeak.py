@@ -15,8 +15,8 @@ from typing import Any
 
 from msgspec.structs import replace
 
+from engage_hri.schemas.advice import suggestion
 from engage_hri.schemas.documents.prosody import Prosody
-from engage_hri.schemas.suggestion import suggestion
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.voice.settings import VoiceSettings
 from engage_hri.services.control.voice.synthesis import (

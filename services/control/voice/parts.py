@@ -11,7 +11,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Speech
-from engage_hri.schemas.speakable import tokens
+from engage_hri.schemas.text import tokens
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.body import Reached, Spoke
 from engage_hri.services.control.voice.clauses import Clause
