@@ -166,7 +166,8 @@ def test_a_full_queue_drops_of_the_loudest_and_never_who_comes_and_goes():
     for number in range(4):
         offer("quiet", state(number), number)
     for number in range(8):
-        offer("", PeerGone(participant=f"p{number}"), number)
+        name = f"p{number}"
+        inbox.offer(Received(keys.alive(name, "client"), PeerGone(participant=name), name, float(number)))
     for number in range(1000):
         offer("loud", state(number), number)
 
