@@ -347,7 +347,8 @@ class ZenohHub(Hub):
         if recent:
             for flow, counts in recent.items():
                 pulse = self._publishers.of(keys.own(self.run, f"pulse/{flow}"), True)
-                pulse.put(pack(counts), encoding="application/msgpack")
+                # With its sender it takes its turn behind the messages that it counts, and makes nobody ask for them.
+                pulse.put(pack(counts), encoding="application/msgpack", source_info=self._source)
 
 
 class ZenohBus(Bus):
