@@ -9,7 +9,7 @@ from engage_hri.schemas.faults import EngageError, Fault, OutcomeUnknown, Reques
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Request
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.sight import NEVER
+from engage_hri.services.bus.deadlines import NEVER
 
 NAME = "generation"
 Question = DescribeBody | EstimateBehaviors

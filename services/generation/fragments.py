@@ -30,7 +30,7 @@ from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
 from engage_hri.schemas.requests import Accepted, Heard, Refused
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
-from engage_hri.services.bus.sight import Sight
+from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.generation.body_link import BodyLink, planned
 from engage_hri.services.generation.choosing_again import (
     barred,
@@ -58,7 +58,6 @@ from engage_hri.services.generation.turns.events import TurnEvents, TurnOutcomes
 from engage_hri.services.generation.turns.heard import HeardWords
 from engage_hri.services.generation.turns.policy import Aborted, TurnPlan, TurnPolicy
 from engage_hri.services.generation.ways import Way, Ways
-from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.requests.serving import GRACE
 from engage_hri.services.runtime.intake import AnswerRequest, MachineClocks, PublishMessage, TellMistake
 

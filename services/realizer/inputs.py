@@ -5,7 +5,7 @@ from msgspec import Struct
 from engage_hri.schemas.body import EstimateBehaviors, Estimates
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.messages import Message
-from engage_hri.services.runtime.ledger import fingerprint
+from engage_hri.services.runtime.intake import fingerprint
 
 
 class BodyAnswered(Struct, frozen=True, kw_only=True, tag="body_answered", omit_defaults=True):

@@ -41,7 +41,7 @@ from engage_hri.services.realizer.together.live import Ending, Live, absence, to
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks, Past, WaitingBlock
 from engage_hri.services.realizer.together.planning import Planning
 from engage_hri.services.requests.ends import Patience, RequestDesk, Requester, unfinished
-from engage_hri.services.runtime.noted import NotedInputs
+from engage_hri.services.runtime.ledger import NotedInputs
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 

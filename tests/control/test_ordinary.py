@@ -9,7 +9,7 @@ import pytest
 from engage_hri.schemas.behaviors import Gaze, GazeShift
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.bus.sight import LATE
+from engage_hri.services.bus.deadlines import LATE
 from engage_hri.services.control.contract.body import Body, BodyFailed, Reached, TakenOver
 from engage_hri.services.control.testing import WORLD, BodyContract, Stage
 from tests.control.test_docs import driver

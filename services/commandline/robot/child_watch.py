@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.sight import Sight
+from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.commandline.shell.supervisor import (
     each_line,
     ended_in_order,
@@ -16,7 +16,6 @@ from engage_hri.services.commandline.shell.supervisor import (
     spawned,
     without_threads,
 )
-from engage_hri.services.requests.deadlines import Silences
 
 SIGN = "\x06"
 """Line that is a sign of life, and not passed on."""

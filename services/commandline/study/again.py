@@ -35,8 +35,7 @@ from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.settings import flat, settings_of
 from engage_hri.services.runtime.again import Again, Find, Lack, StepDifference
 from engage_hri.services.runtime.configuration import read
-from engage_hri.services.runtime.intake import PublishMessage, ServiceIntake
-from engage_hri.services.runtime.ledger import StepClock
+from engage_hri.services.runtime.intake import PublishMessage, ServiceIntake, StepClock
 
 DIFFERENT = 1
 """Exit code if a service does something else with the same settings, and nothing is missing."""

@@ -33,7 +33,7 @@ from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.inputs import BodyAnswered, RealizerInput, behaviors_asked
 from engage_hri.services.realizer.service import realize
 from engage_hri.services.runtime.again import Find, content_of
-from engage_hri.services.runtime.ledger import StepClock
+from engage_hri.services.runtime.intake import StepClock
 from engage_hri.services.runtime.virtual_time import run_virtual
 
 NEAR: Seconds = 0.05

@@ -25,7 +25,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Meters, Radians, Seconds, Vector
 from engage_hri.schemas.world import World
-from engage_hri.services.bus.sight import Sight
+from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.control.contract.body import (
     Arrived,
     BehaviorRefused,
@@ -39,7 +39,6 @@ from engage_hri.services.control.contract.body import (
     TakenOver,
 )
 from engage_hri.services.control.contract.refusals import infeasible
-from engage_hri.services.requests.deadlines import Silences
 
 Angles = Mapping[str, Radians]
 Way = Sequence[tuple[str, Angles]]

@@ -18,11 +18,11 @@ from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, 
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Degrees, Radians, Seconds
 from engage_hri.schemas.world import World
+from engage_hri.services.bus.deadlines import Acquaintances
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.head.inhibitions import Inhibition
 from engage_hri.services.generation.head.maintenance_policy import FaceWatch, GlanceWatch, HandWatch
 from engage_hri.services.generation.head.response_policy import ResponsePolicy
-from engage_hri.services.runtime.absent import Acquaintances
 
 DWELL: Seconds = 0.3
 """Time that the head stays after its owner let go, before a lower claim gets it: a claim that comes back at once

@@ -14,9 +14,9 @@ from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, 
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.bus.deadlines import Absent
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.reports.action_reports import FACE_GRACE
-from engage_hri.services.runtime.absent import Absent
 
 HAND_SPEED = 0.05
 """Speed in m/s above which a hand counts as moving: below it is the noise of vision. Ours."""

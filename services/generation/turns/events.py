@@ -10,11 +10,10 @@ from engage_hri.schemas.blocks import SpokenText
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.sight import Sight
+from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.turns.heard import HeardWords
 from engage_hri.services.generation.turns.policy import Aborted, TurnPlan
-from engage_hri.services.requests.deadlines import Silences
 
 WORDS_PATIENCE: Seconds = 2.0
 """Time after the end of a spoken answer for which the outcome of the turn waits for its words, if somebody tells the

@@ -16,10 +16,9 @@ from engage_hri.schemas.fragments import TurnFragment, TurnStatus
 from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.requests import are_of_one_run
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.sight import Sight
+from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.reports.action_reports import FACE_GRACE
-from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.text.listening import is_listening
 
 TURN_SILENCE: Seconds = 10.0

@@ -12,7 +12,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.sight import Sight
+from engage_hri.services.bus.deadlines import Sight
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.grants import Grants
 from engage_hri.services.realizer.decide.lateness import HeldUp, Late, LatenessWatch, Stalled

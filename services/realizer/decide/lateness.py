@@ -18,12 +18,11 @@ from engage_hri.schemas.behaviors import Event, Speech
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.references import SyncRef, type_name
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.sight import Sight
+from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.realizer.config import LATE, RealizerConfig
 from engage_hri.services.realizer.foresee.expectations import Outlook
 from engage_hri.services.realizer.net.facts import STANDING
 from engage_hri.services.realizer.points import EPSILON, Point
-from engage_hri.services.requests.deadlines import Silences
 
 LATE_FACTOR = 1.0
 """Share of its natural time by which a phase may take longer besides: a long one misses by more. Ours."""

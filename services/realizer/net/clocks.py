@@ -9,8 +9,8 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from msgspec import Struct
 
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.deadlines import Deadlines
 from engage_hri.services.realizer.points import Point
-from engage_hri.services.requests.deadlines import Deadlines
 
 
 class Clocks:

@@ -17,13 +17,13 @@ from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.deadlines import Silences
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Begin, Extend
 from engage_hri.services.realizer.decide.lateness import event_deadline
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.points import EPSILON, Point
-from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused, ServerRestarted
 
 

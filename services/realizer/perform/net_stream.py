@@ -19,7 +19,7 @@ from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.together.live import Live
-from engage_hri.services.runtime.alarm import Timer
+from engage_hri.services.runtime.loop import Timer
 
 EVERY: Seconds = 0.05
 """Least time between two messages about what has changed: nobody sees more of it."""

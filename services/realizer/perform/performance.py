@@ -47,7 +47,7 @@ from engage_hri.services.realizer.together.live_blocks import LiveBlocks, Neighb
 from engage_hri.services.realizer.together.rehearsal import Ask, Rehearsing, is_crowd, parts_moved
 from engage_hri.services.realizer.together.ties import Ties
 from engage_hri.services.requests.ends import Requester
-from engage_hri.services.runtime.alarm import Afterwards, Alarm, Timer
+from engage_hri.services.runtime.loop import Afterwards, Alarm, Timer
 
 
 class SharedContext(Struct, frozen=True):

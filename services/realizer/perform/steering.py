@@ -18,7 +18,7 @@ from engage_hri.services.realizer.report.feedback import ON_REQUEST
 from engage_hri.services.realizer.together.live import Ending, Live, absence
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks
 from engage_hri.services.requests.ends import RequestDesk
-from engage_hri.services.runtime.alarm import Timer
+from engage_hri.services.runtime.loop import Timer
 
 Named = tuple[str, str]
 """A block and a behavior of it. An empty behavior: the whole block; an empty block: the robot."""

@@ -26,7 +26,7 @@ from engage_hri.services.realizer.together.knowledge import Asker, knowledge, ma
 from engage_hri.services.realizer.together.live import Live
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks, Past
 from engage_hri.services.realizer.together.rehearsal import is_crowd, meanwhile, parts_moved, question_about
-from engage_hri.services.runtime.unhurried import unhurried
+from engage_hri.services.runtime.loop import unhurried
 
 ESTIMATE: Seconds = 2.0
 """Time that the body may take to answer what it expects of a block; one that is planning itself needs it. Ours."""
