@@ -56,15 +56,15 @@ LAYERS = {
     "schemas": "documents > *",
     "services": "commandline > console control doctor generation realizer recognition study > tangram"
     " > simulation > client > recording > reports requests > runtime > bus > text",
-    "services/text": "ear > marks > pieces > patterns > acts ends listening > abbreviations",
+    "services/text": "ear > marks > pieces > patterns > ends listening",
     "services/bus": "memory zenoh > answering certificates > interface > payloads subscription > samples often sight"
     " > config journal keyring",
     "services/control": "mujoco > reachy_mini service testing torso > bases calibrating serving > figure voice"
     " > contract > config motion",
     "services/commandline": "look robot study talk > app bodies embedding > shell",
     "services/client": "language_models > robot > orders > feeds people > chunking event_stream inputs",
-    "services/generation": "service > intake > fragments > performance > body_link choosing_again ways > exchange"
-    " fragment_check > acts lost pipeline > block head names > references turns > permits > config",
+    "services/generation": "service > intake > fragments > performance > acts > fragment_check pipeline"
+    " > block exchange head > references turns > inhibitions > config",
     "services/realizer": "service > perform > export together > report > decide > foresee > plan > net"
     " > config inputs points",
     "services/recognition": "service > intake > recognizer > perceive statistics > events > config",
