@@ -40,7 +40,7 @@ from engage_hri.services.generation.exchange import NAME, AnswerCame, Generation
 from engage_hri.services.generation.fragment_check import lacks_people
 from engage_hri.services.generation.fragments import Fragments
 from engage_hri.services.generation.head.arbiter import Arbiter
-from engage_hri.services.generation.head.inhibitions import Leases
+from engage_hri.services.generation.inhibitions import Leases
 from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports
 from engage_hri.services.reports.in_force import Publisher, WorldReport
 from engage_hri.services.reports.ongoing_actions import GoesOn, TimedReport

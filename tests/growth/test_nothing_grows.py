@@ -13,8 +13,8 @@ from engage_hri.services.bus.subscription import KEYS_KEPT
 from engage_hri.services.client.robot import UTTERANCES_KEPT
 from engage_hri.services.console.view import EVENTS_KEPT, WARNINGS_KEPT
 from engage_hri.services.console.view import UTTERANCES_KEPT as UTTERANCES_SHOWN
-from engage_hri.services.generation.turns.heard import MOST as WORDS_KEPT
-from engage_hri.services.generation.turns.heard import PEOPLE
+from engage_hri.services.generation.turns.outcomes import MOST as WORDS_KEPT
+from engage_hri.services.generation.turns.outcomes import PEOPLE
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT
 from engage_hri.services.recognition.events.machine import TEXTS_KEPT
 from engage_hri.services.recognition.events.session import ACTIONS_KEPT, TURNS_KEPT

@@ -1,14 +1,51 @@
-"""Hearing of the robot's words: those of a whole block, with the object at which it pointed meanwhile. Pure."""
+"""Speech between robot and simulated person: its words as a person hears them, a person's as they are told."""
 
 import re
+from collections.abc import Iterator
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.blocks import BlockProgress
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.body_faults import BodyFaults
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import ActionBegan, ActionEnded
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, Utterance
+from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.client.people.actions import RECOGNIZING, Utterances, speaking_time
+from engage_hri.services.simulation.human import Act, Pause, Start, Stop, Understood
+
+
+def speech(words: str, seconds: Seconds | None = None) -> tuple[Act, ...]:
+    """Acts of saying these words. seconds: that it takes; None: as long as such words do."""
+    return (
+        Start("speak", words=words),
+        Pause(speaking_time(words) if seconds is None else seconds),
+        Stop("speak"),
+        Pause(RECOGNIZING),
+        Understood(),
+    )
+
+
+class SpokenWords:
+    """The words of one person. life: of the program that simulates it."""
+
+    def __init__(self, person: str, life: str) -> None:
+        self._utterances = Utterances(person, life)
+        self._said: Utterance | None = None
+
+    def does(self, act: Act, at: Stamp) -> Iterator[Utterance]:
+        """Take an act; only those that concern speech count."""
+        match act:
+            case Start(action="speak", words=words) if words:
+                self._said = replace(self._utterances.begun(at), text=words)
+                yield replace(self._said, text="")
+            case Stop(action="speak") if self._said is not None:
+                self._said = replace(self._said, ended=at)
+            case Understood() if self._said is not None:
+                yield replace(self._said, at=at, final=True)
+                self._said = None
+
 
 THINKING = "ummmm"
 """Words of a robot that will go on speaking: they need no answer."""

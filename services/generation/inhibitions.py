@@ -1,16 +1,77 @@
-"""Inhibition of gaze and of pointing: leases, which end when their request does (`schemas/requests.py`)."""
+"""Inhibition of gaze and of pointing, and what it leaves to fragments.
+
+Inhibitions are leases, which end when their request does (`schemas/requests.py`). Permits are what these, and the
+study's condition, allow at the moment.
+"""
 
 from math import inf
 from typing import Literal
 
 from msgspec import Struct
+from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import Hand
+from engage_hri.schemas.behaviors import (
+    Behavior,
+    Emit,
+    Event,
+    Gaze,
+    GazeShift,
+    Hand,
+    HeadDirectionShift,
+    Pointing,
+    Reference,
+    Speech,
+    TurnSignal,
+    Wait,
+)
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import Claim, Inhibit
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.permits import HANDS, Permits
+
+HANDS: tuple[Hand, ...] = ("LEFT_HAND", "RIGHT_HAND")
+
+
+class Permits(Struct, frozen=True, kw_only=True):
+    """The behaviors that fragments may have now. hands: those to point with. speech_only: words, and nothing else."""
+
+    gaze: bool = True
+    hands: tuple[Hand, ...] = HANDS
+    speech_only: bool = False
+
+    def allows(self, behavior: Behavior) -> bool:
+        if isinstance(behavior, Gaze | GazeShift | HeadDirectionShift):
+            return self.looks
+        if isinstance(behavior, Pointing):
+            wanted = HANDS if behavior.mode == "BOTH_HANDS" else (behavior.mode,) if behavior.mode else ()
+            return bool(self.hands) and set(wanted) <= set(self.hands) and not self.speech_only
+        return not self.speech_only or isinstance(behavior, Speech | Reference | Event | TurnSignal | Emit | Wait)
+
+    def stops(self, running: Behavior) -> bool:
+        """True if a behavior under way must be aborted. A point without `mode` may be made by either arm."""
+        if isinstance(running, Pointing):
+            return not self.allows(running if running.mode else replace(running, mode="BOTH_HANDS"))
+        return isinstance(running, Gaze | GazeShift | HeadDirectionShift) and not self.looks
+
+    @property
+    def looks(self) -> bool:
+        return self.gaze and not self.speech_only
+
+    @property
+    def only_hand(self) -> Hand | None:
+        """The hand to name in a block when only one is left; None: the body may choose, or there is none."""
+        return self.hands[0] if len(self.hands) == 1 else None
+
+    @property
+    def no_gaze(self) -> str:
+        """Reason why references are made without gaze; empty when gaze is permitted."""
+        return "speech only" if self.speech_only else "" if self.gaze else "gaze is inhibited"
+
+    @property
+    def no_point(self) -> str:
+        """Reason why references are made without pointing; empty when a hand is permitted."""
+        return "speech only" if self.speech_only else "" if self.hands else "pointing is inhibited"
+
 
 _HAND_OF: dict[str, Hand] = {"point-left": "LEFT_HAND", "point-right": "RIGHT_HAND"}
 

@@ -1,6 +1,7 @@
-"""Moves punctuation from the start of a speech to the referring phrase before it: a voice can't say a comma alone.
+"""Words of a block as a voice needs them: punctuation stands at the end of a phrase, and a turn ends in a low voice.
 
-In "[the red cup], please" the phrase becomes "the red cup,", and "please" is left of the speech.
+A voice can't say a comma alone. In "[the red cup], please" the phrase becomes "the red cup,", and "please" is left of
+the speech. The last words of a turn are lower, a signal that it is over (thesis 3.3.1). Pure.
 """
 
 import re
@@ -9,7 +10,9 @@ from collections.abc import Collection, Sequence
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import FragmentBehavior, Mark, Reference, Speech
+from engage_hri.schemas.behaviors import BlockBehavior, FragmentBehavior, Mark, Reference, Speech
+from engage_hri.schemas.documents.prosody import marked_up
+from engage_hri.schemas.text import tokens
 
 _ALPHABETIC = r"""(?:['’](?:s|d|m|ll|re|ve)\b)?[.,;:!?…)\]"'”’»]*(?=\s|$)"""
 _IDEOGRAPHIC = "[、。，．；：！？…）］」』】》〉]+"
@@ -57,3 +60,32 @@ def _without_start(speech: Speech, length: int) -> Speech | None:
         return None
     marks = tuple(Mark(mark.id, max(0, mark.position - length)) for mark in speech.marks)
     return replace(speech, text=speech.text[length:], marks=marks)
+
+
+WORDS = 2
+"""Last words of the turn that are lowered."""
+PER_WORD = 2
+"""Characters of a script without spaces that count as one word."""
+
+
+def lowered(behaviors: Sequence[BlockBehavior], last: str) -> tuple[BlockBehavior, ...]:
+    """Lower the end of the speech `last`. A speech with prosodic markup stays as its author wrote it."""
+    return tuple(
+        _lowered(each) if isinstance(each, Speech) and each.id == last and not each.markup else each
+        for each in behaviors
+    )
+
+
+def _lowered(speech: Speech) -> Speech:
+    left, start = float(WORDS), len(speech.text)
+    for token in reversed(list(tokens(speech.text))):
+        if not token.letters:
+            continue
+        start = token.end - len(token.text)
+        left -= 1.0 if token.script == "spaced" else 1.0 / PER_WORD
+        if left <= 0.0:
+            break
+    if start == len(speech.text):
+        return speech
+    markup = marked_up(speech.text, speech.marks, start, len(speech.text), pitch="low")
+    return replace(speech, markup=markup)
