@@ -14,11 +14,12 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.feedback import WarningKind
+from engage_hri.services.realizer.plan.assembly import Assembler
 from engage_hri.services.realizer.plan.handover import Conflict, Turn
 from engage_hri.services.realizer.plan.known import Known
 from engage_hri.services.realizer.plan.losses import Loss, Times
 from engage_hri.services.realizer.plan.part_order import PartOrder, SpeakingOrder
-from engage_hri.services.realizer.plan.phases import Chain, chain
+from engage_hri.services.realizer.plan.phases import Chain, chain, unawaited_events
 from engage_hri.services.realizer.plan.plan import Late, Manner
 from engage_hri.services.realizer.plan.relations import (
     BlockRefused,
@@ -68,6 +69,8 @@ class Draft:
         self.hands: dict[str, Hand] = {}
         self.late: Late = {}
         self.chains: dict[str, Chain] = {}
+        self._left: tuple[set[Point], Relations, Classes, Assembler] | None = None
+        """What `begin_anew` returns, with the ties that were given up by then; None: it is to be found anew."""
         self.relations = relations_of(block, known.blocks)
         self.problems = [*dict.fromkeys((*self.relations.problems, *manner.lost))]
         for behavior in block.behaviors:
@@ -119,14 +122,20 @@ class Draft:
             if needed in self.depending:
                 self.depending[id] = fallen, self.depending[needed][1], self.problems[-1]
 
-    def begin_anew(self) -> tuple[Relations, Classes]:
-        """What the block says of the behaviors that are left, and their points; waits come from changed orders only.
+    def begin_anew(self) -> tuple[Relations, Classes, Assembler]:
+        """What the block says of the behaviors that are left, their points, and what makes their net.
 
-        Raises BlockRefused: they contradict each other.
+        Waits for parts come from changed orders only. Raises BlockRefused: the relations contradict each other.
         """
         self.turns = self.parts.turns - self.overlaps
-        said = untied(self.relations, self.untied) if self.untied else self.relations
-        return remaining(said, self.chains, self.dropped, self.block.id)
+        if self._left is None or self._left[0] != self.untied:
+            said = untied(self.relations, self.untied) if self.untied else self.relations
+            present, classes = remaining(said, self.chains, self.dropped, self.block.id)
+            waited_for = frozenset(self.chains) - unawaited_events(self.chains, present)
+            assembler = Assembler(self.chains, present, classes, waited_for)
+            self._left = {*self.untied}, present, classes, assembler
+        _, present, classes, assembler = self._left
+        return present, classes.copy(), assembler
 
     def give_up(self, found: Iterable[Loss], present: Relations) -> None:
         """Give up what cannot be on time: a wait for the voice, a time of a speech, or else the behavior."""
@@ -150,6 +159,7 @@ class Draft:
         self._let_fall()
         self.order.begin_anew(self.chains, is_retimed=bool(given_up))
         self.parts.begin_anew()
+        self._left = None
         self.doubted.clear()  # What they were too late for may be gone.
 
     def _may_speak_at_once(self, id: str, present: Relations) -> bool:

@@ -20,7 +20,6 @@ one schedule, and the next only when a behavior or a tie is gone, or when anothe
 
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from itertools import accumulate, pairwise
-from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -140,7 +139,7 @@ class SpeakingOrder:
         is_changed = self.current != self._document
         self._document = tuple([id for id in self._document if id in left])
         self.current = () if is_changed and is_retimed else tuple([id for id in self.current if id in left])
-        self._is_last = len(self._document) < 2
+        self._is_last = len(self._document) < 2 or (self._is_last and not is_retimed)
 
     def refute(self, circles: Iterable[Circle]) -> bool:
         """Plan without an order if these circles come of it; False if none does, or if it was the last one.
@@ -159,11 +158,7 @@ class SpeakingOrder:
             return False
         speeches = [chains[id] for id in self._document]
         found = _orders(speeches, seen, lambda later, earlier: is_tied(later, earlier, classes))
-        order = list(dict.fromkeys(chain.behavior.id for each in found for chain in each))
-        for number, id in enumerate(self._document):
-            if id not in order:  # It fits nowhere: it is said in its place in the document, which is impossible.
-                order.insert(order.index(self._document[number - 1]) + 1 if number else 0, id)
-        self.current = tuple(order)
+        self.current = tuple(dict.fromkeys(chain.behavior.id for order in found for chain in order))
         self._is_last = True
         return True
 
@@ -183,14 +178,14 @@ def _turns(users: Iterable[Chain], untouched: Untouched) -> frozenset[Turn]:
 def _orders(
     users: Sequence[Chain],
     untouched: Untouched,
-    is_free: Callable[[Chain, Chain], bool] = lambda later, earlier: False,
+    free: Callable[[Chain, Chain], bool] = lambda later, earlier: False,
 ) -> list[list[Chain]]:
-    """For each part, its users in order, without those that fit nowhere.
+    """For each part, its users in order. One that fits nowhere comes behind the one that it is placed after.
 
-    users: in the order in which they are placed. is_free: true if the ties say themselves how the first follows the
+    users: in the order in which they are placed. free: true if the ties say themselves how the first follows the
     second, so that it waits for nothing else.
     """
-    room = _room(users, untouched, is_free)
+    room = _room(users, untouched, free)
     # A shift takes nothing from a look, nor a look from a shift: see `handover.in_series`.
     groups = [
         [number for number, chain in enumerate(users) if part in chain.parts and (chain.type in SHIFTS) == is_shift]
@@ -204,6 +199,9 @@ def _orders(
         placed = _placed(group, [], room, tries, may_skip=False) or _placed(group, [], room, tries, may_skip=True)
         assert placed is not None
         order, room = placed
+        for before, number in pairwise([-1, *group]):
+            if number not in order:  # It fits nowhere; the schedule tells why.
+                order.insert(order.index(before) + 1 if before in order else 0, number)
         found.append([users[number] for number in order])
     return found
 
@@ -263,16 +261,14 @@ class _Room:
                 room = room.with_wait(earlier, later) or room
 
 
-def _room(users: Sequence[Chain], untouched: Untouched, is_free: Callable[[Chain, Chain], bool]) -> _Room:
+def _room(users: Sequence[Chain], untouched: Untouched, free: Callable[[Chain, Chain], bool]) -> _Room:
     at, times = untouched.assembly.at, np.array(untouched.times)
     spare = spare_times(untouched.ties, untouched.times)
-    clock = distances(0, spare)
+    clock = np.array(distances(0, spare))
     spare[0] = []  # From each start, the way through the start of the block is known then.
+    starts = [at[chain.points[0]] for chain in users]
     ends = [at[chain.points[untouched.left(chain)]] for chain in users]
-    apart = []
-    for start in (at[chain.points[0]] for chain in users):
-        found = distances(start, spare)
-        back = found.get(0, inf)
-        least_spare = [min(found.get(end, inf), back + clock.get(end, inf)) for end in ends]
-        apart.append(times[ends] - times[start] - least_spare)
-    return _Room(np.array(apart), np.array([[is_free(later, earlier) for earlier in users] for later in users]))
+    found = np.array([distances(start, spare) for start in starts])
+    least_spare = np.minimum(found[:, ends], found[:, :1] + clock[ends])
+    is_free = np.array([[free(later, earlier) for earlier in users] for later in users])
+    return _Room(times[ends] - times[starts, None] - least_spare, is_free)

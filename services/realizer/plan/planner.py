@@ -29,7 +29,7 @@ from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
 from engage_hri.services.realizer.plan.losses import clashes
 from engage_hri.services.realizer.plan.other_blocks import naming_others, needless_turns, share
 from engage_hri.services.realizer.plan.part_order import Untouched
-from engage_hri.services.realizer.plan.phases import ARMS, as_run, natural_ends, unawaited_events
+from engage_hri.services.realizer.plan.phases import ARMS, as_run, natural_ends
 from engage_hri.services.realizer.plan.plan import AT_EASE, Manner, Plan, compared, eased, standing
 from engage_hri.services.realizer.plan.relations import BlockRefused, Classes, Equal, Term
 from engage_hri.services.realizer.plan.remaining import remaining
@@ -76,19 +76,17 @@ def _planned(draft: Draft, barred: Container[tuple[str, Hand]]) -> Steps[Plan | 
     one is taken.
     """
     known = draft.known
-    present, classes = draft.begin_anew()
+    present, classes, assembler = draft.begin_anew()
     natural = natural_ends(draft.chains, present)
-    waited_for = frozenset(draft.chains) - unawaited_events(draft.chains, present)
     draft.turns = frozen(turn for turn in draft.turns if {turn[0], turn[1].behavior} <= draft.chains.keys())
     first = Arrangement(natural, known.begun, early=frozenset(draft.early), stops=known.stops)
     arrangement = replace(first, turns=draft.turns, spoken=draft.order.current)
-    assembler = Assembler(draft.chains, present, classes, waited_for)
     given = {name: holder.chain for name, holder in known.holders.items()}
     tried: list[Arrangement] = []
     """Arrangements since the last conflict."""
     while True:
         if (named := naming_others(present, arrangement)) != assembler.relations:
-            assembler = Assembler(draft.chains, named, classes, waited_for)
+            assembler = Assembler(draft.chains, named, classes, assembler.waited_for)
         scheduled = yield from _scheduled(draft, assembler, arrangement, classes)
         if scheduled is None:
             return None
@@ -136,7 +134,7 @@ def _planned(draft: Draft, barred: Container[tuple[str, Hand]]) -> Steps[Plan | 
         estimates=draft.estimates,
         natural=natural,
         required=present.required,
-        waited_for=waited_for,
+        waited_for=assembler.waited_for,
         kept=kept_points(draft.chains, present, arrangement.handovers),
         entering=arranged.ranked,
         turns=draft.turns,
