@@ -10,10 +10,9 @@ from collections.abc import Collection, Iterable, Mapping
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Hand, Unknown
-from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.blocks import Block, WarningKind
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import WarningKind
 from engage_hri.services.realizer.plan.assembly import Assembler
 from engage_hri.services.realizer.plan.handover import Conflict, Turn
 from engage_hri.services.realizer.plan.known import Known
