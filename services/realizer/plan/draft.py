@@ -35,7 +35,7 @@ from engage_hri.services.realizer.points import Point
 
 
 class Draft:
-    """What is left of a block. Parameters: see `plan_tries`."""
+    """Rest of a block: what is planned next, and what was given up so far. Parameters: see `plan_tries`."""
 
     def __init__(
         self,
@@ -122,7 +122,7 @@ class Draft:
                 self.depending[id] = fallen, self.depending[needed][1], self.problems[-1]
 
     def begin_anew(self) -> tuple[Relations, Classes, Assembler]:
-        """What the block says of the behaviors that are left, their points, and what makes their net.
+        """Return what the block says of the behaviors that are left, their classes of points, and their assembler.
 
         Waits for parts come from changed orders only. Raises BlockRefused: the relations contradict each other.
         """

@@ -180,7 +180,9 @@ def _orders(
     untouched: Untouched,
     free: Callable[[Chain, Chain], bool] = lambda later, earlier: False,
 ) -> list[list[Chain]]:
-    """For each part, its users in order. One that fits nowhere comes behind the one that it is placed after.
+    """For each part, its users in order.
+
+    One that fits nowhere comes behind the one that it is placed after; if it is required, it is left out.
 
     users: in the order in which they are placed. free: true if the ties say themselves how the first follows the
     second, so that it waits for nothing else.
@@ -200,7 +202,9 @@ def _orders(
         assert placed is not None
         order, room = placed
         for before, number in pairwise([-1, *group]):
-            if number not in order:  # It fits nowhere; the schedule tells why.
+            # What fits nowhere is to be lost, but for what is required: who is in its way is.
+            is_kept = users[number].behavior.id in untouched.present.required and users[number].type != "speech"
+            if number not in order and not is_kept:
                 order.insert(order.index(before) + 1 if before in order else 0, number)
         found.append([users[number] for number in order])
     return found

@@ -455,7 +455,7 @@ class Classes:
         return point, offset
 
     def place(self, point: Point) -> tuple[Point, Seconds]:
-        """What the point is tied to, and the seconds from there: the start of the block, or else its class."""
+        """The start of the block if the point has a time, or else its representative; and the seconds from there."""
         if point == ORIGIN:
             return ORIGIN, 0.0
         root, offset = self.find(point)

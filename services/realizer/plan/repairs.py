@@ -62,7 +62,7 @@ class Stuck(NamedTuple):
     classes: Classes
 
     def turns_of(self, turns: Iterable[Turn], *circles: Circle) -> list[Turn]:
-        """Those of the turns that the circles go through."""
+        """Find those of the turns that the circles go through."""
         return list(turns_in(by_ends(turns, self.assembly.at), *circles))
 
     def held_up(self) -> Iterable[tuple[Turn, set[Point], bool]]:
@@ -147,12 +147,12 @@ def leave_sooner(draft: Draft, stuck: Stuck) -> Next | None:
 
 
 def waive_waits_of_others(draft: Draft, stuck: Stuck) -> Next | None:
-    """Do not mind that another block waits for this one where this one waits for it, whatever is planned."""
+    """Let another block wait in vain for what waits for it, whatever is planned."""
     return _noted(draft.waived, {tie.pair for tie in stuck.ties if isinstance(tie, Awaited)}, "again")
 
 
 def doubt_others(draft: Draft, stuck: Stuck) -> Next | None:
-    """Do not mind when points of others are expected where that is too late for times that are fixed."""
+    """Forget when points of others are expected where that is too late for times that are fixed."""
     transitions = stuck.assembly.net.transitions
     late = {
         point for tie in stuck.ties if isinstance(tie, Foresight) for point in transitions[tie.target].points
