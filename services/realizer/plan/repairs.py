@@ -38,11 +38,11 @@ from typing import Literal, NamedTuple, TypeVar
 
 from engage_hri.services.realizer.net.petri_net import Bound, Place
 from engage_hri.services.realizer.plan.assembly import Assembly
-from engage_hri.services.realizer.plan.draft import Draft
 from engage_hri.services.realizer.plan.handover import Arrangement, Turn, by_ends, turns_in
 from engage_hri.services.realizer.plan.known import is_foreign
 from engage_hri.services.realizer.plan.losses import Loss, judge
 from engage_hri.services.realizer.plan.relations import Classes, Relations
+from engage_hri.services.realizer.plan.remaining import Draft
 from engage_hri.services.realizer.plan.schedule import Awaited, Circle, Foresight
 from engage_hri.services.realizer.plan.words import other_part, taken
 from engage_hri.services.realizer.points import Point
