@@ -14,18 +14,8 @@ import msgspec
 from msgspec import Meta, Struct
 from msgspec.structs import replace
 
+from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.advice import allowed
-from engage_hri.schemas.behaviors import (
-    Action,
-    After,
-    Constraint,
-    FragmentBehavior,
-    Gaze,
-    Head,
-    Reference,
-    Speech,
-    SpeechOption,
-)
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
 from engage_hri.schemas.text import word_count
@@ -259,7 +249,7 @@ def _nullable(schema: Schema) -> Schema:
 RELIABILITY: dict[Certainty, Probability | None] = {"normal": None, "high": 0.95}
 """Minimum reliability of a reference: generation's default, or that of the pieces to be moved in thesis Appendix
 B."""
-ANSWERS: dict[Expects, tuple[Action, ...]] = {"reply": (), "action": ("act", "speak", "nod", "shake")}
+ANSWERS: dict[Expects, tuple[of.Action, ...]] = {"reply": (), "action": ("act", "speak", "nod", "shake")}
 """Actions that answer the turn; empty: recognition's default."""
 DEMONSTRATIVES = ("this", "that")
 """First words of phrases that need a pointing gesture."""
@@ -305,14 +295,14 @@ def fragment_of(parts: Iterable[Part], turn: ToolInput, id: str) -> TurnFragment
 
     A behavior is named after its part: `say-1`, `refer-2`.
     """
-    behaviors: list[FragmentBehavior] = []
-    order: list[Constraint] = []
+    behaviors: list[of.FragmentBehavior] = []
+    order: list[of.Constraint] = []
     before = ""
     for number, part in enumerate(parts, start=1):
         behavior, resume = _behavior(part, number)
         if before:
-            after = After(ref=before, syncs=(f"{behavior.id}:start",))
-            order.append(Constraint(id=f"order-{number}", operators=(after,)))
+            after = of.After(ref=before, syncs=(f"{behavior.id}:start",))
+            order.append(of.Constraint(id=f"order-{number}", operators=(after,)))
         behaviors.append(behavior)
         before = f"{behavior.id}:{resume}" if resume else before
     return TurnFragment(
@@ -328,13 +318,13 @@ def fragment_of(parts: Iterable[Part], turn: ToolInput, id: str) -> TurnFragment
     )
 
 
-def _behavior(part: Part, number: int) -> tuple[FragmentBehavior, str]:
+def _behavior(part: Part, number: int) -> tuple[of.FragmentBehavior, str]:
     """Behavior of a part, and its sync point at which the next behavior may start; empty: at once."""
     match part:
         case Say(say=text):
-            return Speech(id=f"say-{number}", text=_in_lines(text)), "end"
+            return of.Speech(id=f"say-{number}", text=_in_lines(text)), "end"
         case Refer(refer=target, phrases=phrases, certainty=certainty):
-            reference = Reference(
+            reference = of.Reference(
                 id=f"refer-{number}",
                 target=target,
                 minimum_reliability=RELIABILITY[certainty],
@@ -342,15 +332,15 @@ def _behavior(part: Part, number: int) -> tuple[FragmentBehavior, str]:
             )
             return reference, "end"
         case Look(look=target):
-            return Gaze(id=f"look-{number}", target=target), "stroke"
+            return of.Gaze(id=f"look-{number}", target=target), "stroke"
         case Gesture(gesture=gesture):
-            return Head(id=f"gesture-{number}", lexeme=gesture.upper()), ""
+            return of.Head(id=f"gesture-{number}", lexeme=gesture.upper()), ""
 
 
-def _option(phrase: str) -> SpeechOption:
+def _option(phrase: str) -> of.SpeechOption:
     words = phrase.split()
     deictic = bool(words) and words[0].lower() in DEMONSTRATIVES
-    return SpeechOption(text=" ".join(words), cost=word_count(phrase), deictic=deictic)
+    return of.SpeechOption(text=" ".join(words), cost=word_count(phrase), deictic=deictic)
 
 
 def _part(raw: dict[str, Any], source: str, path: str) -> Part:

@@ -8,7 +8,7 @@ from types import ModuleType
 import msgspec
 import pytest
 
-from engage_hri.schemas.documents.json_codec import decode_json
+from engage_hri.schemas.documents.json_codec import read
 from engage_hri.schemas.summary import Summary
 from engage_hri.schemas.tool import ToolInput
 
@@ -64,7 +64,7 @@ def test_what_the_page_on_language_models_shows_is_so() -> None:
     call, result = re.findall("```json\n(.*?)```", page, re.DOTALL)
     fields = re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE)
 
-    fragment = decode_json(call)
+    fragment = read(call.encode())[0]
     told = msgspec.json.decode(result, type=Summary, strict=True)
     assert [each.id for each in fragment.behaviors] == ["say-1", "refer-2", "say-3", "refer-4"]
     assert msgspec.json.decode(told.json) == msgspec.json.decode(result)

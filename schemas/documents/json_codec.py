@@ -38,18 +38,11 @@ def encode_json(thing: Block | TurnFragment) -> bytes:
     return msgspec.json.format(msgspec.json.encode(thing), indent=2)
 
 
-def decode_json(data: bytes | str, source: str = "", unnamed: str = UNNAMED) -> Block | TurnFragment:
-    """Read one block or fragment. Raises InputRefused with source, JSON path, reason and advice.
-
-    Without `type` it is a fragment if it has a field that only fragments have, or holds a reference.
-    unnamed: the id for a language model's tool call, which has none.
-    """
-    return _thing(_parsed(data, source), source, "$", unnamed)
-
-
 def read(data: bytes, source: str = "", unnamed: str = UNNAMED) -> tuple[Block | TurnFragment, ...]:
-    """Read a file: one XML document, one JSON object, or a JSON array of several. Raises InputRefused.
+    """Read a file: one XML document, one JSON object, or a JSON array of several.
 
+    Raises InputRefused with source, line or JSON path, reason and advice. Without `type` an object is a fragment if
+    it has a field that only fragments have, or holds a reference.
     unnamed: the id for a language model's tool call, which has none; of several `<unnamed>-1`, `<unnamed>-2`...
     """
     start = begins_with(data)

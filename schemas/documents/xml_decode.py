@@ -28,27 +28,12 @@ from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.blocks import Block, Unread, WarningKind
 from engage_hri.schemas.check import check
 from engage_hri.schemas.documents import xml_grammar as grammar
-from engage_hri.schemas.documents.xml_encode import encode_xml
+from engage_hri.schemas.documents import xml_source as xml
 from engage_hri.schemas.documents.xml_grammar import AnyStruct, fields
-from engage_hri.schemas.documents.xml_source import (
-    BML_1_0,
-    CORE,
-    EBML,
-    READ,
-    Source,
-    attributes,
-    bml_children,
-    children_named,
-    foreign_attributes,
-    local_name,
-    prefixed_name,
-    split,
-)  # fmt: skip
+from engage_hri.schemas.documents.xml_source import Source
 from engage_hri.schemas.documents.xml_speech import MARKS, language, spoken
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import SYNC_NAMES, disambiguated, in_draft_spelling
-
-__all__ = ["decode_xml", "encode_xml"]
 
 MOST = 100
 """Notes of one kind that are told: each takes time to make, and is a warning on the bus."""
@@ -79,29 +64,31 @@ class _Document:
 
     def read(self) -> Block | TurnFragment:
         root = self._source.root
-        namespace, local = split(str(root.tag))
-        if local == "ebml" and namespace in ("", EBML):
+        namespace, local = xml.split(str(root.tag))
+        if local == "ebml" and namespace in ("", xml.EBML):
             return self._fragment(root)
-        if local == "bml" and namespace in CORE:
+        if local == "bml" and namespace in xml.CORE:
             return self._block(root, namespace)
-        advice = f'expected <bml> (namespace org.mindmakers.bml, {BML_1_0} or none) or <ebml> (namespace "{EBML}")'
+        advice = (
+            f'expected <bml> (namespace org.mindmakers.bml, {xml.BML_1_0} or none) or <ebml> (namespace "{xml.EBML}")'
+        )
         raise self._source.refusal(
             f"<{local}> of namespace {namespace!r} is neither BML nor EBML", root, advice=advice
         )
 
     def _block(self, root: etree._Element, namespace: str) -> Block:
-        plain = attributes(root)
+        plain = xml.attributes(root)
         self._note_attributes(root)
-        self._note_foreign(root, foreign_attributes(root))
+        self._note_foreign(root, xml.foreign_attributes(root))
         raw = {"composition": plain.get("composition"), "character_id": plain.get("characterId")}
-        self._is_draft = namespace != BML_1_0
+        self._is_draft = namespace != xml.BML_1_0
         raw["dialect"] = "draft" if self._is_draft else "bml-1.0"
         return disambiguated(self._converted(root, raw | self._content(root), Block))
 
     def _fragment(self, root: etree._Element) -> TurnFragment:
         self._is_strict = True
         raw = self._own_fields(root, TurnFragment)
-        self._note_foreign(root, foreign_attributes(root))
+        self._note_foreign(root, xml.foreign_attributes(root))
         fragment = disambiguated(self._converted(root, raw | self._content(root), TurnFragment))
         return in_draft_spelling(fragment, "bml-1.0") if self._speaks_1_0 else fragment
 
@@ -113,7 +100,7 @@ class _Document:
     def _id(self, element: etree._Element) -> str:
         if id := element.get("id"):
             return id
-        raise self._source.refusal(f"<{local_name(element)}> has no id", element, advice='add id="..."')
+        raise self._source.refusal(f"<{xml.local_name(element)}> has no id", element, advice='add id="..."')
 
     def _leave_out(
         self,
@@ -141,7 +128,7 @@ class _Document:
         self, element: etree._Element, behavior: str = "", kind: type[of.Behavior] | None = None
     ) -> list[of.Timing]:
         """Note unknown attributes. kind: of a behavior, in which an attribute that names a sync point is timing."""
-        plain, local = attributes(element), local_name(element)
+        plain, local = xml.attributes(element), xml.local_name(element)
         timing, ignored = list[of.Timing](), list[str]()
         for name in grammar.unknown_attributes(plain, local, kind):
             if kind and grammar.is_reference(plain[name]):
@@ -159,7 +146,7 @@ class _Document:
     def _note_foreign(self, element: etree._Element, parts: Iterable[str], behavior: str = "") -> None:
         """Note what other namespaces add to an element: all in one note."""
         if added := ", ".join(dict.fromkeys(parts)):
-            reason = f"what another namespace adds to <{local_name(element)}> is not supported: {added}"
+            reason = f"what another namespace adds to <{xml.local_name(element)}> is not supported: {added}"
             self._note(reason, element, behavior, "CUSTOM_ATTRIBUTE_NOT_SUPPORTED")
 
     def _walk(self, parent: etree._Element, *, required: bool) -> None:
@@ -170,19 +157,19 @@ class _Document:
             line = self._source.line_of_text(parent if text else behind[0], is_behind=not text)
             self._note(f"text {words[:40]!r} outside of speech", line)
         for element in parent:
-            namespace, local = split(str(element.tag))
-            if namespace not in READ:
+            namespace, local = xml.split(str(element.tag))
+            if namespace not in xml.READ:
                 self._custom(element, namespace, required)
                 continue
-            self._speaks_1_0 |= namespace == BML_1_0
+            self._speaks_1_0 |= namespace == xml.BML_1_0
             if local in ("description", "participant"):
                 continue
-            if local == "reference" and namespace in ("", EBML) and not self._is_strict:
+            if local == "reference" and namespace in ("", xml.EBML) and not self._is_strict:
                 advice = "send it to generation as a turn fragment: <ebml:ebml>"
                 raise self._source.refusal("a block can't hold an object reference", element, advice=advice)
             if local == "required":
                 self._note_attributes(element)
-                self._note_foreign(element, foreign_attributes(element))
+                self._note_foreign(element, xml.foreign_attributes(element))
                 self._walk(element, required=True)
             elif local == "constraint":
                 self._constraints.append(self._constraint(element, required))
@@ -200,8 +187,8 @@ class _Document:
 
     def _speaks_on(self, element: etree._Element) -> bool:
         """Tell whether the text behind an element is speech, as it is behind a reference in a fragment."""
-        namespace, local = split(str(element.tag))
-        return self._is_strict and local == "reference" and namespace in ("", EBML)
+        namespace, local = xml.split(str(element.tag))
+        return self._is_strict and local == "reference" and namespace in ("", xml.EBML)
 
     def _after_reference(self, element: etree._Element, words: str, required: bool) -> of.Speech:
         reference, line = element.get("id"), self._source.line(element)
@@ -217,13 +204,13 @@ class _Document:
         return {each.get("id") for each in self._source.root.iter()}
 
     def _unknown(self, element: etree._Element, name: str, required: bool, **said: str) -> of.Unknown:
-        is_required = required or fields(attributes(element)).get("required")
+        is_required = required or fields(xml.attributes(element)).get("required")
         raw = {"id": self._id(element), "element": name, "required": is_required, **said}
         return self._converted(element, raw, of.Unknown)
 
     def _custom(self, element: etree._Element, namespace: str, required: bool) -> None:
         """Take in a behavior of another namespace. Without an id, and in a fragment, there is but a note of it."""
-        name = prefixed_name(element)
+        name = xml.prefixed_name(element)
         if not self._is_strict and element.get("id"):
             self._behaviors.append(self._unknown(element, name, required, namespace=namespace))
             return
@@ -234,7 +221,7 @@ class _Document:
         self._note(reason, element, element.get("id", ""), kind)
 
     def _behavior(self, element: etree._Element, local: str, required: bool) -> of.Behavior:
-        row, plain = TYPES[local], attributes(element)
+        row, plain = TYPES[local], xml.attributes(element)
         self._note_foreign(element, grammar.foreign_parts(element), self._id(element))
         raw = fields(plain) if row.is_standard else self._own_fields(element, row.kind)
         raw |= {"id": self._id(element)} | ({"required": True} if required else {})
@@ -252,7 +239,7 @@ class _Document:
             self._note(reason, element, raw["id"], "DEGRADED")
             raw["amount"] = str(raw["amount"]).strip().removeprefix("-")
         if local == "emit":
-            said = ((child.text or child.get("id") or "").strip() for child in children_named(element, "event"))
+            said = ((child.text or child.get("id") or "").strip() for child in xml.children_named(element, "event"))
             raw.setdefault("event", next(said, None))
         if local == "reference":
             raw["options"] = self._options(element, raw)
@@ -272,7 +259,7 @@ class _Document:
         if said.is_attribute:
             del element.attrib["text"]  # It has been read.
         raw["markup"] = said.markup or raw.get("markup", "")
-        children = list(bml_children(element))
+        children = list(xml.bml_children(element))
         has_text = any(name == "text" for _, _, name in children)
         for child, _, name in children:
             if name == "text":
@@ -283,7 +270,7 @@ class _Document:
 
     def _choose(self, speech: etree._Element, id: str) -> None:
         """Let a speech say the first of its alternatives."""
-        found = [each for each in speech.iter(etree.Element) if local_name(each) == "alternative"]
+        found = [each for each in speech.iter(etree.Element) if xml.local_name(each) == "alternative"]
         first = {each.getparent(): each for each in reversed(found)}
         if others := [each for each in found if each is not first[each.getparent()]]:
             self._note("only the first <alternative> is said: another", others[0], id, "DEGRADED")
@@ -295,16 +282,16 @@ class _Document:
     def _leave_out_strays(self, speech: etree._Element, id: str) -> None:
         """Leave out elements that a <speech> cannot hold: other behaviors, and anything inside a mark."""
         for stray in list(grammar.behaviors_inside(speech, is_strict=self._is_strict)):
-            local = local_name(stray)
+            local = xml.local_name(stray)
             advice = f'put it beside the speech; a mark says when: start="{id}:m1"'
             self._leave_out(f"unknown element <{local}> in <speech>", stray, id, advice=advice)
             stray.tag = _STRAY
         etree.strip_elements(speech, _STRAY, with_tail=False)
         noted: set[tuple[str, str]] = set()
         for each in speech.iter():
-            if (local := local_name(each)) in MARKS:
+            if (local := xml.local_name(each)) in MARKS:
                 self._only(each, id)
-                unknown = list(grammar.unknown_attributes(attributes(each), local, None))
+                unknown = list(grammar.unknown_attributes(xml.attributes(each), local, None))
                 for name in unknown:
                     if (local, name) not in noted:  # one note for all the marks of a speech
                         self._note(f"<{local}> has no attribute {name!r}", each, id)
@@ -315,7 +302,7 @@ class _Document:
         found: list[dict[str, Any]] = []
         elements = [
             (child, name)
-            for child, _, name in bml_children(element)
+            for child, _, name in xml.bml_children(element)
             if name in grammar.PARTS.keys() & grammar.CHILDREN.get(local, ())
         ]
         for child, name in elements:
@@ -343,7 +330,7 @@ class _Document:
         """Phrases of a reference; None if the author leaves them to generation."""
         options = [
             self._converted(child, self._own_fields(child, of.SpeechOption), of.SpeechOption)
-            for child in children_named(element, "speechOption")
+            for child in xml.children_named(element, "speechOption")
         ]
         if not grammar.says_yes(raw.pop("propose", "")):
             return options
@@ -354,9 +341,9 @@ class _Document:
     def _constraint(self, element: etree._Element, required: bool) -> of.Constraint:
         self._note_attributes(element)
         self._note_foreign(element, grammar.foreign_parts(element))
-        required = required or grammar.says_yes(fields(attributes(element)).get("required"))
+        required = required or grammar.says_yes(fields(xml.attributes(element)).get("required"))
         operators = []
-        for child, _, local in bml_children(element):
+        for child, _, local in xml.bml_children(element):
             if local == "description":
                 continue
             if local not in grammar.OPERATORS:
@@ -366,7 +353,7 @@ class _Document:
                 continue
             self._only(child)
             self._note_attributes(child)
-            for sync in children_named(child, "sync"):
+            for sync in xml.children_named(child, "sync"):
                 if "ref" not in sync.attrib:
                     raise self._source.refusal("<sync> without ref", sync, advice='<sync ref="behavior:sync"/>')
                 self._note_attributes(sync)
@@ -376,11 +363,11 @@ class _Document:
 
     def _own_fields(self, element: etree._Element, kind: type[msgspec.Struct]) -> dict[str, Any]:
         """Read the attributes of an EBML element as fields. Raises InputRefused for an unknown attribute."""
-        plain = attributes(element)
+        plain = xml.attributes(element)
         raw = fields({name: value for name, value in plain.items() if name not in SYNC_NAMES})
         known = {*kind.__struct_fields__, "character_id", "propose" if kind is of.Reference else "id"}
         for name in sorted(raw.keys() - known):
-            reason = f"<{local_name(element)}> has no attribute {grammar.attribute(name)!r}"
+            reason = f"<{xml.local_name(element)}> has no attribute {grammar.attribute(name)!r}"
             known_names = (grammar.attribute(each) for each in grammar.attribute_fields(kind) if each != "required")
             raise self._source.refusal(reason, element, advice=f"known: {', '.join(known_names)}")
         return raw
@@ -403,13 +390,13 @@ class _Document:
             missing = re.fullmatch("Object missing required field `(.*)`", reason)
             lacks = grammar.attribute(missing[1]) if missing else ""
             what = f"no {lacks}" if missing else f"{grammar.attribute(field)}: {reason}"
-            name = f"<{local_name(element)}" + (f" id={raw['id']!r}>" if raw.get("id") else ">")
+            name = f"<{xml.local_name(element)}" + (f" id={raw['id']!r}>" if raw.get("id") else ">")
             advice = f'add {lacks}="..."' if missing else allowed(error, kind)
             raise self._source.refusal(f"{name}: {what}", element, advice=advice) from error
 
 
 def _ties(element: etree._Element) -> list[of.Timing]:
-    children = (child for child in element if split(str(child.tag)) == (EBML, "timing"))
+    children = (child for child in element if xml.split(str(child.tag)) == (xml.EBML, "timing"))
     return [of.Timing(child.get("sync", ""), child.get("ref", "")) for child in children]
 
 

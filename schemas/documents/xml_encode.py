@@ -13,7 +13,7 @@ from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents import xml_grammar as grammar
-from engage_hri.schemas.documents.xml_source import BML_1_0, DRAFT, EBML
+from engage_hri.schemas.documents import xml_source as xml
 from engage_hri.schemas.documents.xml_speech import fill, ties
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
@@ -37,9 +37,9 @@ def encode_xml(thing: Block | TurnFragment) -> bytes:
 
 
 def _document(thing: Block | TurnFragment) -> etree._Element:
-    namespace = BML_1_0 if isinstance(thing, Block) and thing.dialect == "bml-1.0" else DRAFT
-    tag = f"{{{namespace}}}bml" if isinstance(thing, Block) else f"{{{EBML}}}ebml"
-    prefixes: Any = {None: namespace, "ebml": EBML}  # None is lxml's default namespace
+    namespace = xml.BML_1_0 if isinstance(thing, Block) and thing.dialect == "bml-1.0" else xml.DRAFT
+    tag = f"{{{namespace}}}bml" if isinstance(thing, Block) else f"{{{xml.EBML}}}ebml"
+    prefixes: Any = {None: namespace, "ebml": xml.EBML}  # None is lxml's default namespace
     root = etree.Element(tag, {"id": thing.id}, nsmap=prefixes)
     _set_fields(root, thing, namespace)
     for behavior in thing.behaviors:
@@ -60,14 +60,14 @@ def _required(root: etree._Element, namespace: str, required: bool) -> etree._El
 
 def _behavior(root: etree._Element, namespace: str, behavior: of.Behavior) -> None:
     local = type_name(behavior)
-    tag = f"{{{namespace if TYPES[local].is_standard else EBML}}}{local}"
+    tag = f"{{{namespace if TYPES[local].is_standard else xml.EBML}}}{local}"
     plain = {"id": behavior.id}
-    if isinstance(behavior, of.Pointing) and namespace == DRAFT:
-        tag, plain = f"{{{DRAFT}}}gesture", plain | {"type": "POINT"}
+    if isinstance(behavior, of.Pointing) and namespace == xml.DRAFT:
+        tag, plain = f"{{{xml.DRAFT}}}gesture", plain | {"type": "POINT"}
     element = etree.SubElement(root, tag, plain)
-    _set_fields(element, behavior, EBML)
+    _set_fields(element, behavior, xml.EBML)
     if behavior.needs and TYPES[local].is_standard:  # BML has no such attribute
-        element.set(f"{{{EBML}}}needs", element.attrib.pop("needs"))
+        element.set(f"{{{xml.EBML}}}needs", element.attrib.pop("needs"))
     tied = ties(behavior, namespace) if isinstance(behavior, of.Speech) else {}
     _set_timing(element, [timing for timing in behavior.timing if timing.sync not in tied])
     match behavior:
@@ -81,7 +81,7 @@ def _behavior(root: etree._Element, namespace: str, behavior: of.Behavior) -> No
             _express(element, namespace, behavior.expressions)
         case of.FaceShift() if behavior.expressions:
             _express(element, namespace, behavior.expressions)
-        case of.FaceShift() if namespace == BML_1_0 and not (behavior.lexeme and behavior.au):
+        case of.FaceShift() if namespace == xml.BML_1_0 and not (behavior.lexeme and behavior.au):
             _nest(element, namespace, ["lexeme"] if behavior.lexeme else ["facs"] if behavior.au else [])
         case of.Reference():
             if behavior.options is None:
@@ -113,7 +113,7 @@ def _set_timing(element: etree._Element, timings: Sequence[of.Timing]) -> None:
             element.set(timing.sync, timing.ref)
         return
     for timing in timings:
-        etree.SubElement(element, f"{{{EBML}}}timing", {"sync": timing.sync, "ref": timing.ref})
+        etree.SubElement(element, f"{{{xml.EBML}}}timing", {"sync": timing.sync, "ref": timing.ref})
 
 
 def _set_fields(element: etree._Element, thing: Struct, namespace: str) -> None:

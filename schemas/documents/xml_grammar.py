@@ -15,17 +15,7 @@ from lxml import etree
 
 from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.behavior_types import TYPES, BehaviorType
-from engage_hri.schemas.documents.xml_source import (
-    CORE,
-    EBML,
-    bml_children,
-    children_named,
-    foreign_attributes,
-    foreign_children,
-    local_name,
-    prefixed_name,
-    split,
-)
+from engage_hri.schemas.documents import xml_source as xml
 from engage_hri.schemas.references import SYNC_NAMES, SyncRef
 from engage_hri.schemas.vocabulary import SHAPES
 
@@ -166,16 +156,16 @@ _FREE = ("description", "event")
 def behavior_type(namespace: str, local: str, *, is_strict: bool) -> BehaviorType | None:
     """Type of an element that is a behavior, else None. is_strict: in a fragment our elements need no namespace."""
     row = TYPES.get(local)
-    if row is None or (row.is_standard and namespace in CORE):
+    if row is None or (row.is_standard and namespace in xml.CORE):
         return row
-    is_ours = not row.is_standard and (namespace == EBML or (is_strict and not namespace))
+    is_ours = not row.is_standard and (namespace == xml.EBML or (is_strict and not namespace))
     return row if is_ours else None
 
 
 def misplaced(element: etree._Element) -> Iterator[tuple[etree._Element, str, str]]:
     """Find elements below this one that their parent cannot hold, with their own and the parent's name."""
-    holder = local_name(element)
-    for child, _, name in bml_children(element):
+    holder = xml.local_name(element)
+    for child, _, name in xml.bml_children(element):
         if name not in CHILDREN.get(holder, ()) and name not in _ANYWHERE:
             yield child, name, holder
         elif name not in _FREE:
@@ -184,9 +174,9 @@ def misplaced(element: etree._Element) -> Iterator[tuple[etree._Element, str, st
 
 def foreign_parts(element: etree._Element) -> Iterator[str]:
     """Find what other namespaces add to an element and to those inside it, but not inside a <description>."""
-    yield from foreign_attributes(element)
-    yield from (f"<{prefixed_name(child)}>" for child, _ in foreign_children(element))
-    for child, _, name in bml_children(element):
+    yield from xml.foreign_attributes(element)
+    yield from (f"<{xml.prefixed_name(child)}>" for child, _ in xml.foreign_children(element))
+    for child, _, name in xml.bml_children(element):
         if name != "description":
             yield from foreign_parts(child)
 
@@ -194,8 +184,8 @@ def foreign_parts(element: etree._Element) -> Iterator[str]:
 def behaviors_inside(speech: etree._Element, *, is_strict: bool) -> Iterator[etree._Element]:
     """Find behaviors and constraints below a speech, which is no place for them. is_strict: in a fragment."""
     for child in speech:
-        namespace, local = split(str(child.tag))
-        is_grouping = namespace in CORE and local in ("constraint", "required")
+        namespace, local = xml.split(str(child.tag))
+        is_grouping = namespace in xml.CORE and local in ("constraint", "required")
         if is_grouping or behavior_type(namespace, local, is_strict=is_strict):
             yield child
         elif local != "description":
@@ -226,7 +216,7 @@ def fields(plain: Mapping[str, str]) -> dict[str, Any]:
 def lists(element: etree._Element, kind: type[msgspec.Struct]) -> dict[str, list[str]]:
     """Values of the fields that are lists of elements inside this one."""
     return {
-        field: [str(child.get(item, "")) for child in children_named(element, local)]
+        field: [str(child.get(item, "")) for child in xml.children_named(element, local)]
         for field, (local, item) in LISTS.items()
         if field in kind.__struct_fields__
     }

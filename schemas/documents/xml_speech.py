@@ -10,20 +10,8 @@ from typing import NamedTuple
 from lxml import etree
 
 from engage_hri.schemas.behaviors import Mark, Speech, Timing
-from engage_hri.schemas.documents.xml_source import (
-    BML_1_0,
-    CORE,
-    EBML,
-    READ,
-    SSML,
-    XML,
-    Source,
-    attributes,
-    escape,
-    local_name,
-    quoteattr,
-    split,
-)
+from engage_hri.schemas.documents import xml_source as xml
+from engage_hri.schemas.documents.xml_source import Source
 from engage_hri.schemas.faults import InputRefused
 
 MARKS = ("sync", "tm", "mark")
@@ -50,8 +38,8 @@ def spoken(source: Source, speech: etree._Element, id: str) -> Spoken:
     if len(texts) > 1:
         raise source.refusal("more than one <text>", texts[1], advice="one <speech> for each")
     content = texts[0] if texts else speech
-    description, attribute = _ssml(speech), attributes(speech).get("text", "")
-    preserve = content.get(f"{{{XML}}}space") == "preserve"
+    description, attribute = _ssml(speech), xml.attributes(speech).get("text", "")
+    preserve = content.get(f"{{{xml.XML}}}space") == "preserve"
     reading = _Reading(source, id, preserve=preserve, hears_all=bool(texts) or description is None)
     reading.content(content)
     said = reading.result("")
@@ -74,7 +62,7 @@ def language(source: Source, speech: etree._Element) -> str:
     """
     texts = [child for child in speech if _kind(child) == "text"]
     for element in (*texts, speech, *speech.iterancestors()):
-        tag = element.get(f"{{{XML}}}lang")
+        tag = element.get(f"{{{xml.XML}}}lang")
         if tag is not None:
             if tag and not _LANGUAGE.fullmatch(tag):
                 advice = "a tag such as `de` or `pt-BR`"
@@ -87,14 +75,14 @@ def _ssml(speech: etree._Element) -> etree._Element | None:
     """Find the prosodic markup, in a `<description type="application/ssml+xml">` of BML 1.0."""
     for child in speech:
         if _kind(child) == "description" and child.get("type") == "application/ssml+xml":
-            return child[0] if len(child) and split(str(child[0].tag))[1] == "speak" else child
+            return child[0] if len(child) and xml.split(str(child[0].tag))[1] == "speak" else child
     return None
 
 
 def _kind(element: etree._Element) -> str:
     """Local name of a core element; empty for elements of other namespaces."""
-    namespace, local = split(str(element.tag))
-    return local if namespace in CORE else ""
+    namespace, local = xml.split(str(element.tag))
+    return local if namespace in xml.CORE else ""
 
 
 class _Reading:
@@ -117,14 +105,14 @@ class _Reading:
     def content(self, element: etree._Element, *, nested: bool = False) -> None:
         self.say(element.text or "")
         for child in element:
-            namespace, local = split(str(child.tag))
-            known = namespace in CORE or namespace == SSML
+            namespace, local = xml.split(str(child.tag))
+            known = namespace in xml.CORE or namespace == xml.SSML
             if known and local in MARKS:
                 self._mark(child)
             elif known and local != "description":
                 self._prosodic = element if self._prosodic is None and not nested else self._prosodic
                 self.content(child, nested=True)
-            elif namespace not in READ and self._hears_all:
+            elif namespace not in xml.READ and self._hears_all:
                 self.content(child, nested=True)
             self.say(child.tail or "")
 
@@ -162,23 +150,25 @@ class _Reading:
 
 def serialized(element: etree._Element) -> str:
     """Write the inner XML without namespaces, as a voice takes it; marks as SSML's `<mark name>`."""
-    parts = [escape(element.text or "")]
+    parts = [xml.escape(element.text or "")]
     for child in element:
-        local = local_name(child)
+        local = xml.local_name(child)
         if local in MARKS:
-            parts.append(f"<mark name={quoteattr(child.get('id') or child.get('name') or child.get('ref') or '')}/>")
+            parts.append(
+                f"<mark name={xml.quoteattr(child.get('id') or child.get('name') or child.get('ref') or '')}/>"
+            )
         elif local != "description":
             inner = serialized(child)
             opening = f"{local}{''.join(_attribute(str(name), str(value)) for name, value in child.items())}"
             parts.append(f"<{opening}>{inner}</{local}>" if inner else f"<{opening}/>")
-        parts.append(escape(child.tail or ""))
+        parts.append(xml.escape(child.tail or ""))
     return "".join(parts)
 
 
 def _attribute(name: str, value: str) -> str:
-    namespace, local = split(name)
-    prefix = "xml:" if namespace == XML else ""
-    return f" {prefix}{local}={quoteattr(value)}" if prefix or not namespace else ""
+    namespace, local = xml.split(name)
+    prefix = "xml:" if namespace == xml.XML else ""
+    return f" {prefix}{local}={xml.quoteattr(value)}" if prefix or not namespace else ""
 
 
 def fill(element: etree._Element, speech: Speech, namespace: str) -> None:
@@ -188,16 +178,16 @@ def fill(element: etree._Element, speech: Speech, namespace: str) -> None:
     is an attribute of our namespace.
     """
     markup = _read_back(speech, namespace) if speech.markup else None
-    if markup is not None and namespace != BML_1_0:
+    if markup is not None and namespace != xml.BML_1_0:
         element.append(markup)
         return
     content = etree.SubElement(element, f"{{{namespace}}}text")
     if markup is not None:
         element.append(markup)
     elif speech.markup:
-        element.set(f"{{{EBML}}}markup", speech.markup)
+        element.set(f"{{{xml.EBML}}}markup", speech.markup)
     if speech.text != _WHITE.sub(" ", speech.text).strip(" "):
-        content.set(f"{{{XML}}}space", "preserve")
+        content.set(f"{{{xml.XML}}}space", "preserve")
     tied = ties(speech, namespace)
     ends = [*(mark.position for mark in speech.marks), len(speech.text)]
     content.text = speech.text[: ends[0]] or None
@@ -212,7 +202,7 @@ def ties(speech: Speech, namespace: str) -> dict[str, dict[str, str]]:
     timed = [timing.sync for timing in speech.timing if timing.sync in order]
     ahead = [timing.sync for timing in speech.timing[: len(speech.timing) - len(timed)]]
     is_last = not set(order).intersection(ahead) and timed == [id for id in order if id in timed]
-    if namespace != BML_1_0 or not is_last or any(timing.sync == timing.ref for timing in speech.timing):
+    if namespace != xml.BML_1_0 or not is_last or any(timing.sync == timing.ref for timing in speech.timing):
         return {}
     return {timing.sync: {"ref": timing.ref} for timing in speech.timing if timing.sync in order}
 
@@ -222,8 +212,8 @@ def _read_back(speech: Speech, namespace: str) -> etree._Element | None:
 
     None if reading it would not give the same speech: it is no XML, or has other words than the text.
     """
-    if namespace == BML_1_0:
-        ssml = f'<speak xmlns="{SSML}">{speech.markup}</speak>'
+    if namespace == xml.BML_1_0:
+        ssml = f'<speak xmlns="{xml.SSML}">{speech.markup}</speak>'
         content = f'<text/><description priority="1" type="application/ssml+xml">{ssml}</description>'
         expected = Spoken("", (), speech.markup, ())
     else:

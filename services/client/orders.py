@@ -23,10 +23,7 @@ from engage_hri.schemas.requests import Outcome, Request
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Keep
 from engage_hri.services.client.feeds import Feed, first_of
-from engage_hri.services.client.inputs import (
-    checked,
-    taken,
-)
+from engage_hri.services.client.inputs import checked, taken
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
 
 

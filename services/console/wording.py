@@ -1,14 +1,23 @@
-"""Words for the live view, the log and the tally, so that all say the same."""
+"""Words for the live view, the log, the tally and the page, so that all say the same.
 
-from collections.abc import Sequence
+Looks, pointings, nods and speech are seen as actions (schemas/perception.py), whoever asks for them. Of all else that
+the robot performs - gestures by name, faces, postures, turns of the head - only those know the names who have the
+block: `deeds` makes words of it.
+"""
 
-from engage_hri.schemas.behaviors import Action, EventKind
-from engage_hri.schemas.blocks import Hold, WarningFeedback
-from engage_hri.schemas.fragments import Claim
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from engage_hri.schemas import behaviors as of
+from engage_hri.schemas.behavior_types import TYPES, dialect_sync, same_instant
+from engage_hri.schemas.blocks import Block, Hold, WarningFeedback
+from engage_hri.schemas.fragments import Claim, TurnFragment
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
+from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.vocabulary import normal
 
-KINDS: dict[EventKind, str] = {
+KINDS: dict[of.EventKind, str] = {
     "directed_gaze": "directed gaze",
     "mutual_facial_gaze": "mutual facial gaze",
     "adjacency_pair": "adjacency pair",
@@ -39,7 +48,7 @@ def clock(value: Seconds) -> str:
     return f"{int(minutes)}:{rest:04.1f}"
 
 
-VERBS: dict[Action, tuple[str, str]] = {
+VERBS: dict[of.Action, tuple[str, str]] = {
     "look": ("looks", "at "),
     "point": ("points", "at "),
     "nod": ("nods", "to "),
@@ -49,7 +58,7 @@ VERBS: dict[Action, tuple[str, str]] = {
 }
 
 
-def action_words(action: Action, targets: Sequence[str], robot: str) -> tuple[str, str]:
+def action_words(action: of.Action, targets: Sequence[str], robot: str) -> tuple[str, str]:
     """Words for an action and its targets: `looks`, `at the robot`.
 
     A look without targets is a look away; other actions without targets have no words for them.
@@ -103,3 +112,67 @@ def claim(claim: Claim) -> str:
     """Write a claim as `fragment: rectangle (turn-3)`."""
     text = f"{claim.kind}: {claim.target}" if claim.target else claim.kind
     return f"{text} ({claim.reason})" if claim.reason else text
+
+
+ACTIONS = ("NOD", "SHAKE")
+"""Movements of the head of which actions tell."""
+
+LACKS, NEAR = "this body has no", ", as near as it can"
+"""Words of a warning of the body that performs something near, which it names itself, and those for the deed."""
+HANDS: Mapping[of.Hand, str] = {
+    "LEFT_HAND": " with the left hand", "RIGHT_HAND": " with the right hand", "BOTH_HANDS": " with both hands",
+}  # fmt: skip
+
+
+class Deed(NamedTuple):
+    """Words for what the robot does in a behavior. sync: when it is seen, in the spelling of the block's dialect."""
+
+    sync: str
+    words: str
+
+    def as_warned(self, warning: str) -> "Deed":
+        """Tell that the body does only something near to it. warning: of kind DEGRADED, which says what it lacks."""
+        return self._replace(words=f"{self.words}{NEAR}") if LACKS in warning else self
+
+
+def deeds(thing: Block | TurnFragment) -> dict[tuple[str, str], Deed]:
+    """List what is performed besides actions, by block and behavior. The block of a fragment has its id."""
+    dialect = thing.dialect if isinstance(thing, Block) else "draft"
+    found = {}
+    for behavior in thing.behaviors:
+        if words := _words(behavior):
+            type = type_name(behavior)
+            row = TYPES[type]
+            seen = "stroke_start" if row.has_stroke else "stroke" if "stroke" in row.points else row.points[-1]
+            sync = dialect_sync(same_instant(seen, type), type, dialect)
+            found[thing.id, behavior.id] = Deed(sync or seen, words)
+    return found
+
+
+def _words(behavior: of.Behavior) -> str:
+    """Say what the robot does; empty: actions tell of it, or there is nothing to see."""
+    match behavior:
+        case of.Gesture(lexeme=lexeme, mode=mode):
+            return f"makes the gesture {lexeme}{HANDS[mode] if mode else ''}"
+        case of.Head(lexeme=lexeme) if normal(lexeme) not in ACTIONS:
+            return f"moves the head: {lexeme}"
+        case of.Face() | of.FaceLexeme() | of.FaceFacs() | of.FaceShift():
+            shown = " and ".join(filter(None, map(_expression, of.expressed(behavior))))
+            return f"shows the face {shown}" if shown else ""
+        case of.Posture() | of.PostureShift():
+            poses = [" ".join(filter(None, (each.lexeme, each.part))) for each in of.posed(behavior)]
+            taken = " and ".join(filter(None, (behavior.stance, *poses)))
+            return f"takes the posture {taken}" if taken else ""
+        case of.Pose(lexeme=lexeme, part=part):
+            return f"takes the pose {' '.join(filter(None, (lexeme, part)))}"
+        case of.Gaze() | of.GazeShift() if behavior.offset_angle:
+            direction = f" {behavior.offset_direction}" if behavior.offset_direction else ""
+            return f"looks {behavior.offset_angle:g}°{direction} of {behavior.target}"
+        case of.Locomotion(target=target):
+            return f"moves to {target}"
+    return ""
+
+
+def _expression(shown: of.Expression) -> str:
+    name = shown.lexeme or (f"AU {shown.au}" if shown.au else "")
+    return f"{name} {shown.side.lower()}" if name and shown.side != "BOTH" else name

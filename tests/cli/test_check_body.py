@@ -17,8 +17,7 @@ from rich.console import Console
 
 from engage_hri.schemas.body import Capabilities, JointLimit
 from engage_hri.services.control.testing.check import check
-from engage_hri.services.control.testing.render import Printed
-from engage_hri.services.control.testing.report import BodyReport, Stated
+from engage_hri.services.control.testing.report import BodyReport, Printed, Stated
 from engage_hri.services.control.torso.body import SimulatedBody
 from tests.cli.command import Engage
 
@@ -153,7 +152,7 @@ def test_a_broken_law_says_what_was_measured_where_and_what_it_usually_is(engage
     assert ended.code == 1
     assert "BROKEN  takes the time that it predicted" in ended.out
     expected, measured = "287 ms from stroke_start, within 100 ms", "574 ms"
-    assert f"- gaze at near-right, stroke: expected: {expected}; measured: {measured}" in ended.out
+    assert f"- gaze at near-right, stroke: expected {expected}; measured {measured}" in ended.out
     assert "more; --json has all" in ended.out
     assert "usually: the estimate is the time of the command: the joints arrive later" in ended.out
     assert "1 law is broken, 0 laws hold, 0 laws do not apply." in ended.out
@@ -219,7 +218,7 @@ def test_a_body_that_never_comes_home_is_told_so_by_one_law(engage: Engage, driv
     ended = engage("check-body", "drivers.py:Waiting", "--law", "home is reached")
 
     assert ended.code == 1
-    assert "expected: that `home` returns within 30.0 s; measured: it does not" in ended.out
+    assert "expected that `home` returns within 30.0 s; measured it does not" in ended.out
 
 
 def test_who_plays_no_fault_is_told_where_it_says_how(engage: Engage, drivers: Path) -> None:

@@ -8,7 +8,7 @@ from engage_hri.schemas.fragments import Claim, HeadOwner
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.web.frames import HEARTBEAT, Receipts, Viewer, You
 from engage_hri.services.console.web.lanes import KEPT
-from engage_hri.services.console.web.picture import BLOCK, SECTIONS, Picture
+from engage_hri.services.console.web.picture import BLOCK, Picture
 from tests.console.scenes import at
 from tests.console.test_picture import RUN, picture
 
@@ -21,7 +21,7 @@ def frame(viewer: Viewer, made: Picture, now: Seconds, **more: Any) -> Any:
 def test_the_first_frame_has_all_and_the_next_only_what_has_changed() -> None:
     made, viewer = picture(), Viewer()
     first = frame(viewer, made, 10.0)
-    assert set(first["sections"]) == set(SECTIONS)
+    assert set(first["sections"]) == set(made.versions)
     assert frame(viewer, made, 10.1) is None
 
     made.feed(HeadOwner(owner=Claim(kind="none", priority=0), since=at(10.2)), 10.2, 10.2)

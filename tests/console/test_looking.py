@@ -4,7 +4,7 @@ import pytest
 
 from engage_hri.schemas.fragments import Claim, ClaimKind
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.console.web.looking import plainly
+from engage_hri.services.console.web.scene import plainly
 
 ANN = Entity(id="ann", kind="person", position=(1.2, 0.0, 1.2))
 HAND = Entity(id="ann-hand", kind="hand", owner="ann", position=(1.0, 0.0, 0.8))

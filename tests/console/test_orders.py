@@ -23,15 +23,17 @@ from engage_hri.services.console.web.orders import (
     ConditionOrder,
     InhibitGaze,
     LookOrder,
+    Script,
     SteerOrder,
     SwitchOrder,
     Tell,
+    backchannel,
     decoded,
     denied,
+    told,
     written,
 )
 from engage_hri.services.console.web.scene import NEAR, laid
-from engage_hri.services.console.web.script import Script, backchannel, told
 from engage_hri.services.tangram.table import tangram_table
 
 

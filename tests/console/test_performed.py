@@ -7,7 +7,7 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.console.performed import Deed, deeds
+from engage_hri.services.console.wording import Deed, deeds
 from engage_hri.services.control.torso.body import SimulatedBody
 
 WORDS = {

@@ -15,8 +15,7 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.console.web.frames import OrderNews, Receipts
-from engage_hri.services.console.web.orders import Given
-from engage_hri.services.console.web.script import Script
+from engage_hri.services.console.web.orders import Given, Script
 from engage_hri.services.console.web.seats import Seats
 from engage_hri.services.console.web.service import window
 from engage_hri.services.console.web.visitor import Visitor

@@ -19,9 +19,10 @@ from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.figure.alive import CLOSED, CLOSING, OPENING, Blinks, closure
 from engage_hri.services.control.testing import WORLD, Stage, performed
 from engage_hri.services.control.testing.motions import recorded, violations
-from engage_hri.services.control.testing.witness import CROWDS, witnessed
+from engage_hri.services.control.testing.truth import CROWDS, crowded
 from engage_hri.services.control.torso.body import SimulatedBody
 from tests.control.directing import robot
+from tests.control.watching import Bystander
 
 LIDS, LEAN = ("left_lid", "right_lid"), ("torso_lean", "neck_pitch")
 TEXT = "Please move the yellow triangle, and then the blue square."
@@ -108,10 +109,10 @@ async def test_whatever_it_does_is_the_same_with_it_and_without(crowd: str) -> N
                 await asyncio.sleep(0.05)
 
         watching = asyncio.create_task(watch())
-        witness = await witnessed(body, WORLD, CROWDS[crowd], Random(crowd))
-        watching.cancel()
+        witness = await crowded(Bystander(), body, CROWDS[crowd], Random(crowd))
         assert witness is not None
-        assert witness.lies == []
+        assert await witness.close() == []
+        watching.cancel()
         points = [
             (stage.behavior.id, item.sync, round(item.at - start, 9))
             for stage in witness.stages

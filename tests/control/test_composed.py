@@ -22,9 +22,9 @@ from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.control.bases.composed import ComposedBody, Member, composed
 from engage_hri.services.control.contract.body import BehaviorRefused, Body, MouthShape, MovementAuthority, Reached
-from engage_hri.services.control.testing.asked import BEHAVIORS, WORLD
 from engage_hri.services.control.testing.contract import BodyContract
 from engage_hri.services.control.testing.stage import Stage, performed
+from engage_hri.services.control.testing.suite import BEHAVIORS, WORLD
 from engage_hri.services.control.torso.body import SimulatedBody
 from tests.random_cases import trials
 

@@ -36,7 +36,7 @@ from engage_hri.services.control.contract.body import BodyState, MovementAuthori
 from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.figure.tracks import PartTrack
 from engage_hri.services.control.testing import Stage
-from engage_hri.services.control.testing.laws import aside
+from engage_hri.services.control.testing.findings import aside
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.runtime.virtual_time import run_virtual
 

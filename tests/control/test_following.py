@@ -15,7 +15,7 @@ from engage_hri.services.control.bases.drivers import made
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.body import Body, BodyFailed, Progress
 from engage_hri.services.control.testing import Stage
-from engage_hri.services.control.testing.laws import aside, beside
+from engage_hri.services.control.testing.findings import aside, beside
 
 POINTED, LOOKED = 0.05, 0.05
 """Metres by which a forearm may pass its target, as capabilities say, and radians by which eyes may look beside."""

@@ -12,8 +12,9 @@ from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.contract.body import Arrived, Reached
 from engage_hri.services.control.testing import WORLD, Stage, performed, times
-from engage_hri.services.control.testing.motions import recorded, stops, violations
+from engage_hri.services.control.testing.motions import recorded, violations
 from engage_hri.services.control.torso.body import SimulatedBody
+from tests.control.watching import stops
 
 
 def body_in(world: World) -> SimulatedBody:

@@ -16,9 +16,9 @@ from engage_hri.schemas.world import World
 from engage_hri.services.control.bases.one_part_motion import OrdinaryBody
 from engage_hri.services.control.contract.body import Body, MovementAuthority
 from engage_hri.services.control.testing import BodyContract
-from engage_hri.services.control.testing.laws import Finding, LawBroken
+from engage_hri.services.control.testing.findings import Finding, LawBroken
 from engage_hri.services.control.testing.motions import unused
-from engage_hri.services.control.testing.witness import CROWDS
+from engage_hri.services.control.testing.truth import CROWDS
 from engage_hri.services.control.torso.body import SimulatedBody
 from tests.control import liars, liars_by_claim, liars_by_deed
 
@@ -124,8 +124,11 @@ class Judge(BodyContract):
     """A suite that is asked one law at a time."""
 
     def __init__(self, make: Callable[[], Body], faults: Mapping[str, Callable[[], Body]] | None = None) -> None:
-        self.make = make  # type: ignore[method-assign]
+        self._make = make
         self._faults = faults or {}
+
+    def make(self) -> Body:
+        return self._make()
 
     def faults(self) -> Mapping[str, Callable[[], Body]]:
         return self._faults

@@ -27,10 +27,10 @@ from engage_hri.schemas.body import EstimateItem, PlannedTime
 from engage_hri.services.control.contract.body import Arrived, BehaviorRefused, BodyFailed, BodyState, Spoke
 from engage_hri.services.control.figure.repertoire import BUILT_IN, extended
 from engage_hri.services.control.testing import WORLD, Stage, performed, times
-from engage_hri.services.control.testing.laws import aside, beside
+from engage_hri.services.control.testing.findings import aside, beside
 from engage_hri.services.control.testing.motions import STEP, recorded, violations
 from engage_hri.services.control.testing.suite import ON_AXIS
-from engage_hri.services.control.testing.witness import arms
+from engage_hri.services.control.testing.truth import arms
 from engage_hri.services.control.torso.body import SimulatedBody
 from tests.random_cases import share_of
 

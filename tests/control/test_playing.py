@@ -2,7 +2,7 @@
 
 from engage_hri.schemas.body import Capabilities, FaultKind, JointLimit
 from engage_hri.schemas.body_faults import BodyFault, flaw
-from engage_hri.services.control.testing.playing import playable
+from engage_hri.services.control.testing.truth import playable
 from engage_hri.services.control.torso.body import SimulatedBody
 
 JOINT = JointLimit(joint="tilt", part="head", low=-1.0, high=1.0, speed=1.0, acceleration=10.0)

@@ -26,8 +26,9 @@ from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.figure.repertoire import BUILT_IN, TABLES, Absent, GesturePath, HeadPath, Repertoire
 from engage_hri.services.control.testing import WORLD, Stage, performed, times
-from engage_hri.services.control.testing.motions import recorded, stops, violations
+from engage_hri.services.control.testing.motions import recorded, violations
 from engage_hri.services.control.torso.body import SimulatedBody
+from tests.control.watching import stops
 
 PAGE = Path(__file__).parents[2] / "docs" / "control.md"
 LEXEMES: list[BlockBehavior] = [

@@ -27,7 +27,7 @@ from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.body import BodyFailed
 from engage_hri.services.control.service import embody
-from engage_hri.services.control.testing.asked import WORLD
+from engage_hri.services.control.testing.suite import WORLD
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.service import running

@@ -30,10 +30,11 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.contract.bell import Bell
 from engage_hri.services.control.contract.body import Arrived, BehaviorRefused, MovementAuthority
 from engage_hri.services.control.testing import WORLD, Stage, performed, times
-from engage_hri.services.control.testing.motions import recorded, stops, violations
+from engage_hri.services.control.testing.motions import recorded, violations
 from engage_hri.services.control.testing.stage import default
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.runtime.virtual_time import run_virtual
+from tests.control.watching import stops
 from tests.random_cases import share_of
 
 ARMS = ("LEFT_HAND", "RIGHT_HAND")

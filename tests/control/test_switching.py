@@ -13,13 +13,13 @@ from engage_hri.schemas.body_faults import KINDS, BodyFault, flaw, words
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.control.config import Displaced, Slow, Stall, Variability
 from engage_hri.services.control.contract.body import Body, BodyFailed, MovementAuthority, Progress, Spoke
-from engage_hri.services.control.testing.asked import WORLD
-from engage_hri.services.control.testing.laws import angles
+from engage_hri.services.control.testing.findings import angles
 from engage_hri.services.control.testing.motions import recorded, violations
 from engage_hri.services.control.testing.stage import Stage, default, performed, times
-from engage_hri.services.control.testing.suite import Suite
-from engage_hri.services.control.testing.witness import CROWDS, crowded
+from engage_hri.services.control.testing.suite import WORLD
+from engage_hri.services.control.testing.truth import CROWDS, crowded
 from engage_hri.services.control.torso.body import SimulatedBody
+from tests.control.watching import Bystander
 from tests.random_cases import share_of
 
 POINT = Pointing(id="p", target="near-right", mode="RIGHT_HAND")
@@ -281,7 +281,7 @@ async def test_whatever_fault_comes_no_point_is_reported_that_the_joints_do_not_
         able = tuple(kind for kind in able if kind != "displaced")
     trouble = asyncio.create_task(troubled(body, able, chance))
     async with recorded(body) as recording:
-        witness = await crowded(Suite(), body, CROWDS[crowd], chance)
+        witness = await crowded(Bystander(), body, CROWDS[crowd], chance)
         trouble.cancel()
         body.switch_faults([])
         assert witness is not None

@@ -9,8 +9,8 @@ from engage_hri.services.control.config import ControlConfig, Displaced, Slow, S
 from engage_hri.services.control.contract.body import BehaviorRefused, BodyFailed, Reached, Spoke
 from engage_hri.services.control.contract.variability import Deviations, configured, is_lost, normal
 from engage_hri.services.control.testing import WORLD, Stage, performed, times
-from engage_hri.services.control.testing.laws import poses_agree
 from engage_hri.services.control.torso.body import SimulatedBody
+from tests.control.watching import poses_agree
 
 POINT = Pointing(id="p", target="near-right")
 

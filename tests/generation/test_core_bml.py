@@ -19,7 +19,8 @@ from engage_hri.schemas.blocks import (
     WarningFeedback,
 )
 from engage_hri.schemas.documents.dialects import core, in_dialect
-from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
+from engage_hri.schemas.documents.xml_decode import decode_xml
+from engage_hri.schemas.documents.xml_encode import encode_xml
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import SyncRef, type_name

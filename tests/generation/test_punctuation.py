@@ -8,7 +8,8 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import After, Constraint, Mark, Speech, Synchronize
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.json_codec import encode_json, read
-from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
+from engage_hri.schemas.documents.xml_decode import decode_xml
+from engage_hri.schemas.documents.xml_encode import encode_xml
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.talk.offline_plan import generated

@@ -28,7 +28,7 @@ from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.console.web import orders
 from engage_hri.services.console.web.frames import Receipts, Viewer
-from engage_hri.services.console.web.script import Script
+from engage_hri.services.console.web.orders import Script
 from engage_hri.services.console.web.service import WindowServer, window
 from engage_hri.services.console.web.visitor import Visitor
 from engage_hri.services.runtime.absent import FORGOTTEN_AFTER

@@ -3,7 +3,7 @@
 import pytest
 
 from engage_hri.schemas.advice import meant, suggestion
-from engage_hri.schemas.documents.json_codec import decode_json
+from engage_hri.schemas.documents.json_codec import read
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.faults import InputRefused
 
@@ -82,6 +82,6 @@ def test_a_wrong_attribute_is_told_with_what_is_allowed(xml: str, place: str, ad
 )  # fmt: skip
 def test_a_wrong_value_of_json_is_told_with_what_is_allowed(json: str, place: str, advice: str) -> None:
     with pytest.raises(InputRefused) as refused:
-        decode_json(json)
+        read(json.encode())[0]
 
     assert (refused.value.fault.where, refused.value.fault.advice) == (place, advice)

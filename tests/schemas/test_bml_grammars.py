@@ -4,7 +4,8 @@ import pytest
 
 from engage_hri.schemas.behaviors import FaceShift, Mark, Speech, Timing
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
+from engage_hri.schemas.documents.xml_decode import decode_xml
+from engage_hri.schemas.documents.xml_encode import encode_xml
 from tests.schemas.grammar import violations
 
 GAZE = '<gaze id="g" target="t"/>'

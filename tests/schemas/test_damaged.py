@@ -116,4 +116,4 @@ def test_what_is_not_utf_8_is_refused_with_its_line() -> None:
 def test_half_a_character_is_no_id_and_no_text() -> None:
     assert not is_id("caf\udce9")
     with pytest.raises(InputRefused, match="half a character"):
-        json_codec.decode_json('{"id": "\ud800"}')
+        json_codec.read_call('{"id": "\ud800"}', "f")

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.check import problems
-from engage_hri.schemas.documents.json_codec import decode_json, encode_json, read
+from engage_hri.schemas.documents.json_codec import encode_json, read
 from engage_hri.schemas.export import EXPORTED
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
@@ -53,7 +53,7 @@ CALL = {
 
 
 def decoded(call: object) -> TurnFragment:
-    fragment = decode_json(json.dumps(call), unnamed="f")
+    fragment = read(json.dumps(call).encode(), unnamed="f")[0]
     assert isinstance(fragment, TurnFragment)
     return fragment
 
@@ -258,7 +258,7 @@ def test_only_who_goes_on_can_think(status: str) -> None:
 def test_the_full_fragment_is_accepted_too() -> None:
     fragment = decoded(CALL)
 
-    assert decode_json(json.dumps({"id": "g", "turn_status": "end", "behaviors": []})).id == "g"
+    assert read(json.dumps({"id": "g", "turn_status": "end", "behaviors": []}).encode())[0].id == "g"
     assert decoded(json.loads(encode_json(fragment))) == fragment
 
 

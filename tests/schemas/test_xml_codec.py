@@ -26,7 +26,8 @@ from engage_hri.schemas.behaviors import (
     Wait,
 )
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
+from engage_hri.schemas.documents.xml_decode import decode_xml
+from engage_hri.schemas.documents.xml_encode import encode_xml
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
 from tests.schemas.strategies import without_lines

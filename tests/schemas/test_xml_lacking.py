@@ -4,7 +4,8 @@ import pytest
 
 from engage_hri.schemas.behaviors import Speech, Unknown
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
+from engage_hri.schemas.documents.xml_decode import decode_xml
+from engage_hri.schemas.documents.xml_encode import encode_xml
 from engage_hri.schemas.documents.xml_source import BML_1_0, DRAFT
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.vocabulary import DEFINED

@@ -3,7 +3,8 @@
 import pytest
 
 from engage_hri.schemas.behaviors import Speech
-from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
+from engage_hri.schemas.documents.xml_decode import decode_xml
+from engage_hri.schemas.documents.xml_encode import encode_xml
 from engage_hri.schemas.faults import InputRefused
 
 SPACES = ("", ' xmlns="org.mindmakers.bml"', ' xmlns="http://www.bml-initiative.org/bml/bml-1.0"')

@@ -5,7 +5,8 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Gaze, Mark, Speech, Timing, Unknown
 from engage_hri.schemas.blocks import Block, Unread
-from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
+from engage_hri.schemas.documents.xml_decode import decode_xml
+from engage_hri.schemas.documents.xml_encode import encode_xml
 from engage_hri.schemas.faults import InputRefused
 from tests.schemas.test_xml_codec import BML_1_0, DRAFT, behavior, block
 

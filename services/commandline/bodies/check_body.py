@@ -64,8 +64,7 @@ def main(options: Options) -> int:
         reason = f"check-body needs {' and '.join(missing).replace('_', '-')}"
         raise InputRefused(Fault(reason=reason, advice=extra_command("check")))
     from engage_hri.services.control.testing.check import check
-    from engage_hri.services.control.testing.render import Printed
-    from engage_hri.services.control.testing.report import Stated, as_json
+    from engage_hri.services.control.testing.report import Printed, Stated, as_json
 
     stated = Stated(
         tolerance=options.tolerance, noise=math.radians(options.noise), accuracy=math.radians(options.accuracy),

@@ -101,8 +101,7 @@ async def _play(options: Options, recording: "Recording") -> None:
 async def _show(options: Options, config: RobotConfig, things: tuple[Thing, ...]) -> None:
     server = _web()
     from engage_hri.services.bus.zenoh.neighbors import hinting
-    from engage_hri.services.console.web.orders import RIGHTS
-    from engage_hri.services.console.web.script import Script
+    from engage_hri.services.console.web.orders import RIGHTS, Script
     from engage_hri.services.console.web.service import window
 
     token = kept_token(options.token_file) if options.token_file else secrets.token_urlsafe(TOKEN)

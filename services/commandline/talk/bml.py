@@ -11,7 +11,7 @@ import typer
 
 from engage_hri.schemas.blocks import Block, Dialect
 from engage_hri.schemas.documents.dialects import core, in_dialect
-from engage_hri.schemas.documents.xml_decode import encode_xml
+from engage_hri.schemas.documents.xml_encode import encode_xml
 from engage_hri.services.commandline.shell.failing_output import print_format
 from engage_hri.services.commandline.shell.options import Configured, WorldFile
 from engage_hri.services.commandline.shell.process import DONE

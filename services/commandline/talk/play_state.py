@@ -19,7 +19,7 @@ from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.shell.process import DONE, FAILED
 from engage_hri.services.commandline.shell.sources import Thing
-from engage_hri.services.console.performed import deeds
+from engage_hri.services.console.wording import deeds
 
 WORDS: Seconds = 2.0
 """Time after an answer in words in which these become known."""

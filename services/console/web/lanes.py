@@ -11,15 +11,8 @@ from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventState, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.view import OWN_BLOCKS
-from engage_hri.services.console.web.sections import (
-    BehaviorLane,
-    BlockLane,
-    EventShown,
-    Level,
-    PersonMeasures,
-    SyncShown,
-    Zero,
-)
+from engage_hri.services.console.web import sections
+from engage_hri.services.console.web.sections import Zero
 
 KEPT: Seconds = 90.0
 """Time for which what has ended is kept."""
@@ -43,7 +36,7 @@ class EventLanes:
         for id in (*ended, *list(self._events)[: max(0, len(self._events) - MOST)]):
             self._events.pop(id, None)
 
-    def shown(self, zero: Zero) -> tuple[EventShown, ...]:
+    def shown(self, zero: Zero) -> tuple[sections.EventShown, ...]:
         """The events, the oldest first."""
         return tuple(each.shown(zero) for each in self._events.values())
 
@@ -64,9 +57,9 @@ class _Event:
         if event.state in ENDINGS and self.until is None:
             self.until = at
 
-    def shown(self, zero: Zero) -> EventShown:
+    def shown(self, zero: Zero) -> sections.EventShown:
         event = self.event
-        return EventShown(
+        return sections.EventShown(
             id=event.id, kind=event.kind, by=event.initiator, to=event.responder, about=event.objects,
             cause=event.cause, state=self.decision, optional=event.optional, delay=self.delay, limit=event.limit,
             since=zero(self.since), decided=_or_none(zero, self.decided), until=_or_none(zero, self.until),
@@ -127,7 +120,7 @@ class BlockLanes:
             del self._blocks[id]
         return gone
 
-    def shown(self, id: str, zero: Zero) -> BlockLane:
+    def shown(self, id: str, zero: Zero) -> sections.BlockLane:
         """The lane of a block that is known."""
         return self._blocks[id].shown(id, zero)
 
@@ -177,22 +170,22 @@ class _Block:
                 found.append(tuple(one_of_each.items()))
         self.ties = tuple(found)
 
-    def shown(self, id: str, zero: Zero) -> BlockLane:
+    def shown(self, id: str, zero: Zero) -> sections.BlockLane:
         def moved(time: Seconds | None) -> Seconds | None:
             return None if time is None else zero(self.since + time)
 
         lanes = [
-            BehaviorLane(
+            sections.BehaviorLane(
                 id=name,
                 type=self.types.get(name, ""),
                 points=tuple(
-                    SyncShown(sync, moved(each.first), moved(each.planned), moved(each.measured))
+                    sections.SyncShown(sync, moved(each.first), moved(each.planned), moved(each.measured))
                     for sync, each in points.items()
                 ),
             )
             for name, points in self.points.items()
         ]
-        return BlockLane(
+        return sections.BlockLane(
             id=id, since=zero(self.since), until=_or_none(zero, self.until), status=self.status,
             own=id.startswith(OWN_BLOCKS), behaviors=tuple(lanes), ties=self.ties,
         )  # fmt: skip
@@ -211,7 +204,7 @@ VALUES_KEPT = 600
 """Values of a course that are kept."""
 APART: Seconds = 0.5
 """Time of which a course keeps two values at most; the newest is always there."""
-UNKNOWN: tuple[Level, tuple[str, ...]] = ("unknown", ("recognition has left the bus",))
+UNKNOWN: tuple[sections.Level, tuple[str, ...]] = ("unknown", ("recognition has left the bus",))
 """Level of everybody, with the reason, while there is no recognition."""
 Course = deque[tuple[Seconds, float]]
 
@@ -224,7 +217,7 @@ class Measures:
         self._delays: deque[tuple[Seconds, float, str]] = deque(maxlen=VALUES_KEPT)
         self._life = ""
         """Life of recognition; empty: unknown."""
-        self._left: dict[str, tuple[Level, tuple[str, ...]]] = {}
+        self._left: dict[str, tuple[sections.Level, tuple[str, ...]]] = {}
         """Levels and reasons that recognition told last, while it is not there."""
 
     @property
@@ -268,14 +261,14 @@ class Measures:
                 return False
         return True
 
-    def _set(self, told: Mapping[str, tuple[Level, tuple[str, ...]]]) -> None:
+    def _set(self, told: Mapping[str, tuple[sections.Level, tuple[str, ...]]]) -> None:
         for actor, (level, reasons) in told.items():
             self._people[actor].level, self._people[actor].reasons = level, reasons
 
-    def shown(self, actor: str, zero: Zero) -> PersonMeasures:
+    def shown(self, actor: str, zero: Zero) -> sections.PersonMeasures:
         """The courses of a person, with their instants in seconds of the picture."""
         person = self._people[actor]
-        return PersonMeasures(
+        return sections.PersonMeasures(
             actor=actor,
             level=person.level,
             reasons=person.reasons,
@@ -290,7 +283,7 @@ class Measures:
 
 class _Person:
     def __init__(self) -> None:
-        self.level: Level = "unknown"
+        self.level: sections.Level = "unknown"
         self.reasons: tuple[str, ...] = ()
         self.engagement: Course = deque(maxlen=VALUES_KEPT)
         self.mtbce: Course = deque(maxlen=VALUES_KEPT)

@@ -36,27 +36,13 @@ from engage_hri.services.console import nets, view, wording
 from engage_hri.services.console.web import scene
 from engage_hri.services.console.web.health import HealthBoard
 from engage_hri.services.console.web.lanes import BlockLanes, EventLanes, Measures
-from engage_hri.services.console.web.looking import plainly
+from engage_hri.services.console.web.scene import plainly
 from engage_hri.services.console.web.sections import Choice, HeadSection, Note, Switched, UtteranceShown
 from engage_hri.services.console.web.turns import ShownTurns
 from engage_hri.services.runtime.absent import Acquaintances
 
 CHOICES_KEPT = 40
 NOTES_KEPT = 40
-SECTIONS = (
-    "scene",
-    "words",
-    "head",
-    "events",
-    "nets",
-    "tokens",
-    "delays",
-    "references",
-    "health",
-    "notes",
-    "switched",
-)
-"""Names of the sections that are always there; `sections.py` has their fields."""
 BLOCK, NET, MEASURES = "block/", "net/", "measures/"
 """Beginnings of the names of sections that each block, net and person has for itself, as `block/step-3`."""
 SETTLED_EVERY: Seconds = 1.0
@@ -89,7 +75,21 @@ class Picture:
         self._choices: deque[Choice] = deque(maxlen=CHOICES_KEPT)
         self._health = HealthBoard()
         self._notes: deque[Note] = deque(maxlen=NOTES_KEPT)
-        self.versions = dict.fromkeys(SECTIONS, 1)
+        self._sections: dict[str, Callable[[], Any]] = {
+            "scene": lambda: scene.section(self._scene, self._world, self._state, self._body),
+            "words": self._words,
+            "head": self._head,
+            "events": lambda: self._events.shown(self.zero),
+            "nets": lambda: list(self._nets),
+            "tokens": lambda: [nets.tokens(net) for net in self._nets.values()],
+            "delays": lambda: self._measures.delays(self.zero),
+            "references": lambda: list(self._choices),
+            "health": self._health.shown,
+            "notes": lambda: list(self._notes),
+            "switched": self._switched,
+        }
+        """Makers of the sections that are always there; `sections.py` has their fields."""
+        self.versions = dict.fromkeys(self._sections, 1)
         """Number of the newest state of each section."""
         self._number = 1
         self._encoded: dict[str, tuple[int, bytes]] = {}
@@ -322,20 +322,7 @@ class Picture:
             return nets.laid_out(self._nets[name.removeprefix(NET)], self.zero)
         if name.startswith(MEASURES):
             return self._measures.shown(name.removeprefix(MEASURES), self.zero)
-        made: dict[str, Callable[[], Any]] = {
-            "scene": lambda: scene.section(self._scene, self._world, self._state, self._body),
-            "words": self._words,
-            "head": self._head,
-            "events": lambda: self._events.shown(self.zero),
-            "nets": lambda: list(self._nets),
-            "tokens": lambda: [nets.tokens(net) for net in self._nets.values()],
-            "delays": lambda: self._measures.delays(self.zero),
-            "references": lambda: list(self._choices),
-            "health": self._health.shown,
-            "notes": lambda: list(self._notes),
-            "switched": self._switched,
-        }
-        return made[name]()
+        return self._sections[name]()
 
     def _words(self) -> list[UtteranceShown]:
         holds = [each.hold for each in self._scene.held]

@@ -1,7 +1,10 @@
-"""The scene in space: the world as perception tells it, the robot's body, and who does what. Pure.
+"""The scene in space: the world as perception tells it, the body, who does what, and where the robot looks. Pure.
 
 It is seen from above as the person opposite the robot sees it: the robot is at the top, and its left is on the right.
 Where somebody drops a piece in it, the piece is laid at the neighbor whose edge it nearly touches, as a hand would.
+
+The arbiter of the head speaks of claims, of which one owns the head (`schemas/fragments.py`). Here they are told in
+words that everybody understands: the target of the robot's looks, and the reason. Researchers find the terms beside.
 """
 
 import math
@@ -12,28 +15,31 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.body import Capabilities, RobotState
 from engage_hri.schemas.footprints import SIDES, corners, overlap, poses_touching
+from engage_hri.schemas.fragments import Claim, ClaimKind
 from engage_hri.schemas.units import Meters, Radians, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.console.view import Actor, Scene
-from engage_hri.services.console.web.sections import Above, Arm, BodyShown, PersonShown, SceneSection, Thing
+from engage_hri.services.console.web import sections
 
 HALF_ANGLE: Radians = 0.1
 """Half the angle of the gaze cone of a body that has not said its own."""
 
 
-def section(scene: Scene, world: World | None, state: RobotState | None, body: Capabilities | None) -> SceneSection:
+def section(
+    scene: Scene, world: World | None, state: RobotState | None, body: Capabilities | None
+) -> sections.SceneSection:
     """Everything that is seen in space. world, state, body: None: nothing was told of it yet."""
     entities = world.entities if world is not None else ()
     people = {entity.id: entity.position for entity in entities if entity.kind == "person"}
     actors = [actor.id for actor in scene.actors.values() if actor.id != scene.robot and actor.present]
     shown = tuple(_person(scene.actor(id), people.get(id)) for id in dict.fromkeys((*people, *actors)))
     edges = _frame(entities, [each.at for each in shown if each.at is not None and each.present])
-    return SceneSection(
+    return sections.SceneSection(
         robot=scene.robot,
         body=_body(state, scene.actor(scene.robot), body) if state is not None else None,
         things=tuple(_thing(entity) for entity in entities if entity.kind != "person"),
         people=shown,
-        above=Above(RIGHT, DOWN, PictureEdges(*map(_short, edges))),
+        above=sections.Above(RIGHT, DOWN, PictureEdges(*map(_short, edges))),
     )
 
 
@@ -42,20 +48,20 @@ def label(entity: Entity) -> str:
     return entity.name or " ".join(filter(None, (entity.color, entity.category or entity.shape))) or entity.id
 
 
-def _thing(entity: Entity) -> Thing:
+def _thing(entity: Entity) -> sections.Thing:
     outline = [(_short(x), _short(y)) for x, y in corners(entity)]
-    return Thing(
+    return sections.Thing(
         entity.id, entity.kind, _place(entity.position), _short(entity.yaw), tuple(outline), _short(entity.radius),
         entity.color, label(entity), entity.owner,
     )  # fmt: skip
 
 
-def _person(actor: Actor, at: Vector | None) -> PersonShown:
+def _person(actor: Actor, at: Vector | None) -> sections.PersonShown:
     def targets(action: str) -> tuple[str, ...]:
         return tuple(target for doing in actor.doing if doing.action == action for target in doing.targets)
 
     doing = {each.action for each in actor.doing}
-    return PersonShown(
+    return sections.PersonShown(
         id=actor.id, at=None if at is None else _place(at), present=actor.present,
         looks=actor.look.targets if actor.look is not None else None,
         points=targets("point"), acts=targets("act") or (("",) if "act" in doing else ()),
@@ -63,13 +69,13 @@ def _person(actor: Actor, at: Vector | None) -> PersonShown:
     )  # fmt: skip
 
 
-def _body(state: RobotState, actor: Actor, body: Capabilities | None) -> BodyShown:
+def _body(state: RobotState, actor: Actor, body: Capabilities | None) -> sections.BodyShown:
     arms = [
-        Arm(side, _place(ray.origin), _place(ray.tip or ray.origin))
+        sections.Arm(side, _place(ray.origin), _place(ray.tip or ray.origin))
         for side, ray in (("left", state.left_arm), ("right", state.right_arm))
         if ray is not None
     ]
-    return BodyShown(
+    return sections.BodyShown(
         eyes=_place(state.gaze.origin) if state.gaze else None,
         gaze=_place(state.gaze.axis) if state.gaze else None,
         spread=_short((body.gaze_half_angle if body else HALF_ANGLE) + (state.gaze.error if state.gaze else 0.0)),
@@ -181,3 +187,73 @@ def _on_surface(world: World, place: Vector) -> Vector:
             ys = [surface.position[1] + corner[1] for corner in surface.footprint]
             return (min(max(x, min(xs)), max(xs)), min(max(y, min(ys)), max(ys)), z)
     return place
+
+
+WHY: dict[ClaimKind, str] = {
+    "inhibition": "somebody keeps its gaze there",
+    "fragment": "this belongs to what it is saying",
+    "glance": "nothing has passed between them for a while",
+    "response": "it answers a look or a gesture",
+    "hands": "this hand is moving",
+    "face": "it keeps its eyes on a person while nothing else is to be seen",
+    "none": "it has not seen anybody yet",
+}
+"""Reason by the kind of a claim, where nothing more is known."""
+CLOSER: dict[tuple[ClaimKind, str], str] = {
+    ("fragment", "until its block ends"): "it has not finished what it is saying",
+    ("fragment", "thinks"): "it thinks about what to say next",
+    ("hands", "manipulates"): "this hand is moving a thing",
+    ("face", "spoken to last"): "it spoke to this person last",
+    ("face", "nearest when it came"): "nobody else was nearer",
+    ("face", "lost"): "the person there has gone",
+}
+"""Reason by the kind of a claim and the beginning of what the arbiter says."""
+ANSWERED = {
+    "directed gaze": "{} looked or pointed there",
+    "mutual facial gaze": "{} looks at the robot",
+    "adjacency pair": "{} spoke to the robot",
+    "backchannel": "{} showed that they listen",
+}
+"""Reason of a response, by what it answers."""
+KEPT = {
+    "hold": "{} keeps its gaze where it is",
+    "release": "{} keeps its gaze at rest",
+    "target": "{} keeps its gaze there",
+}
+"""Reason of an inhibition, by the mode of the lease."""
+SPEECH_ONLY = "speech only"
+
+
+def plainly(claim: Claim, world: World) -> sections.ClaimShown:
+    """A claim in plain words, with its terms."""
+    return sections.ClaimShown(
+        claim.kind, claim.priority, claim.target, claim.reason, _where(claim, world), _why(claim)
+    )
+
+
+def _where(claim: Claim, world: World) -> str:
+    """Movement of the head that the claim asks for."""
+    if claim.kind == "inhibition" and claim.reason.startswith(SPEECH_ONLY):
+        return "look up, past everything"
+    if not claim.target:
+        return "look straight ahead" if claim.kind == "none" else "keep its head where it is"
+    entity = world.entity(claim.target)
+    if entity is None:
+        return f"look at {claim.target}"
+    if entity.kind == "hand" and entity.owner:
+        return f"look at a hand of {entity.owner}"
+    if entity.kind == "person":
+        return f"look at {entity.name or entity.id}"
+    return f"look at the {label(entity)}"
+
+
+def _why(claim: Claim) -> str:
+    begins, _, rest = claim.reason.partition(":")
+    if claim.kind == "inhibition" and begins == SPEECH_ONLY:
+        return "the condition of the study leaves it words alone"
+    if claim.kind == "inhibition" and rest.strip() in KEPT:
+        return KEPT[rest.strip()].format(begins)
+    what, of, who = claim.reason.rpartition(" of ")
+    if claim.kind == "response" and of and what in ANSWERED:
+        return ANSWERED[what].format(who)
+    return CLOSER.get((claim.kind, begins), WHY[claim.kind])

@@ -19,8 +19,8 @@ from engage_hri.services.bus.interface import Bus, Hub, Subscription
 from engage_hri.services.client.robot import Robot
 from engage_hri.services.console.follow import FOLLOWED, following
 from engage_hri.services.console.web.health import NOTABLE
+from engage_hri.services.console.web.orders import Script
 from engage_hri.services.console.web.picture import Picture
-from engage_hri.services.console.web.script import Script
 from engage_hri.services.console.web.seats import Invitation, Seats, invitation
 
 PATTERNS = (
@@ -142,19 +142,13 @@ async def window(
     """
     async with Robot.on(bus) as robot:
         shown = WindowServer(hub, bus, robot, script, keyed=keyed, began=began)
-        async with _following(shown):
-            yield shown
-
-
-@asynccontextmanager
-async def _following(shown: WindowServer) -> AsyncIterator[None]:
-    async with following(shown.bus, (shown,), patterns=PATTERNS):
-        with shown.bus.subscribe(keys.ANY_PERCEIVED_ONGOING) as reports:
-            looking = asyncio.create_task(shown.look_after(), name="status")
-            noting = asyncio.create_task(shown.note_reporters(reports), name="who tells of whom")
-            try:
-                yield
-            finally:
-                looking.cancel()
-                noting.cancel()
-                await asyncio.wait([looking, noting])
+        async with following(bus, (shown,), patterns=PATTERNS):
+            with bus.subscribe(keys.ANY_PERCEIVED_ONGOING) as reports:
+                looking = asyncio.create_task(shown.look_after(), name="status")
+                noting = asyncio.create_task(shown.note_reporters(reports), name="who tells of whom")
+                try:
+                    yield shown
+                finally:
+                    looking.cancel()
+                    noting.cancel()
+                    await asyncio.wait([looking, noting])

@@ -18,7 +18,7 @@ from engage_hri.services.client.chunking import parts_of
 from engage_hri.services.client.inputs import fragment_in
 from engage_hri.services.client.people.perceive import check_id, perceive
 from engage_hri.services.client.people.perceived_person import PerceivedPerson, free_seat, not_a_thing
-from engage_hri.services.console.web import orders, script
+from engage_hri.services.console.web import orders
 from engage_hri.services.console.web.frames import Receipts, Viewer, You
 from engage_hri.services.console.web.orders import Panel
 from engage_hri.services.console.web.scene import laid
@@ -182,13 +182,13 @@ class Visitor:
                     raise InputRefused(Fault(reason="nothing to say", advice=advice))
                 if left_out:
                     self.receipts.tell("wizard", "; ".join(left_out))
-                self._drives(self._perform(script.told(parts, target, asks, addressee)))
+                self._drives(self._perform(orders.told(parts, target, asks, addressee)))
             case orders.Prepared(number=number, addressee=addressee):
                 if number >= len(self._window.script):
                     raise InputRefused(Fault(reason=f"the script has no fragment {number + 1}"))
                 self._drives(self._perform(self._window.script.take(number, addressee)))
             case orders.BackchannelOrder(how=how, addressee=addressee):
-                self._drives(self._perform(script.backchannel(how, addressee)))
+                self._drives(self._perform(orders.backchannel(how, addressee)))
             case orders.InhibitGaze(on=True, mode=mode, target=target):
                 if self._inhibits:
                     raise InputRefused(Fault(reason="you keep the gaze already", advice="let it go first"))

@@ -8,14 +8,12 @@
 Each test is a law. Its docstring says what holds, and, after that, what it usually is if it does not.
 """
 
-from engage_hri.services.control.testing.claims import ClaimLaws
 from engage_hri.services.control.testing.endings import EndingLaws
+from engage_hri.services.control.testing.estimates import ClaimLaws, PredictionLaws
 from engage_hri.services.control.testing.freedom import FreedomLaws
 from engage_hri.services.control.testing.holding import HoldingLaws
-from engage_hri.services.control.testing.looking import LookingLaws
+from engage_hri.services.control.testing.looking import LookingLaws, TakeoverLaws
 from engage_hri.services.control.testing.points import PointsLaws
-from engage_hri.services.control.testing.predictions import PredictionLaws
-from engage_hri.services.control.testing.takeovers import TakeoverLaws
 from engage_hri.services.control.testing.truth import TruthLaws
 
 

@@ -11,8 +11,8 @@ from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.services.control.contract.body import AbortMode, Body, Spoke
+from engage_hri.services.control.testing.findings import OLD_READINGS, broken, degrees, listed, ms
 from engage_hri.services.control.testing.holding import NOTHING, is_movement
-from engage_hri.services.control.testing.laws import OLD_READINGS, broken, degrees, listed, ms
 from engage_hri.services.control.testing.motions import Recording, Violation, recorded, violations
 from engage_hri.services.control.testing.stage import PATIENCE, Connection, Stage, standing, still_running
 from engage_hri.services.control.testing.suite import Suite, by_each, does_not_apply, trials
@@ -241,11 +241,10 @@ class EndingLaws(Suite):
                     advice="are the motors asked often enough, and is it the newest reading that `angles` tells?",
                     cause=OLD_READINGS,
                 )
-            unit = each.unit.removeprefix("degrees")
             when = each.at - recording.times[0]
             broken(
-                expected=f"{each.what} of {each.joint} up to {degrees(each.limit)}{unit}",
-                measured=f"{degrees(each.measured)}{unit}, {ms(when)} after it was asked for",
+                expected=f"{each.what} of {each.joint} up to {degrees(each.limit)}{each.unit}",
+                measured=f"{degrees(each.measured)}{each.unit}, {ms(when)} after it was asked for",
                 advice=_encoders(each) if each.what != "range" else "",
             )
 

@@ -22,7 +22,7 @@ from msgspec import Struct
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.body import Body
-from engage_hri.services.control.testing.laws import broken, ms
+from engage_hri.services.control.testing.findings import broken, ms
 from engage_hri.services.control.testing.motions import recorded
 from engage_hri.services.control.testing.stage import done
 from engage_hri.services.control.testing.suite import Suite, by_each

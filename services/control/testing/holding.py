@@ -9,11 +9,10 @@ from engage_hri.schemas.behaviors import BlockBehavior, Gesture, Mark, Pointing,
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.body import Arrived, Body, Reached, Spoke
-from engage_hri.services.control.testing.asked import HOLDS
-from engage_hri.services.control.testing.laws import broken, listed, ms
+from engage_hri.services.control.testing.findings import broken, listed, ms
 from engage_hri.services.control.testing.motions import recorded
 from engage_hri.services.control.testing.stage import Stage, done, times
-from engage_hri.services.control.testing.suite import Suite, by_each, does_not_apply, trials
+from engage_hri.services.control.testing.suite import HOLDS, Suite, by_each, does_not_apply, trials
 
 SETTLING: Seconds = 0.5
 """Time for the last tenths of a degree, once the joints are near enough to say that they have arrived."""

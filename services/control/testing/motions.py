@@ -18,7 +18,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from engage_hri.schemas.body import JointLimit
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.services.control.contract.body import Body
-from engage_hri.services.control.testing.laws import angles
+from engage_hri.services.control.testing.findings import angles
 
 STEP: Seconds = 0.004
 """Time between two samples."""
@@ -46,12 +46,8 @@ class Violation(Struct, frozen=True, kw_only=True):
 
     @property
     def unit(self) -> str:
-        """Unit of the two numbers in words, once they are in degrees."""
-        return {"range": "degrees", "speed": "degrees/s", "acceleration": "degrees/s^2"}[self.what]
-
-    def __str__(self) -> str:
-        measured, limit = math.degrees(self.measured), math.degrees(self.limit)
-        return f"{self.joint}: {self.what} {measured:.1f} {self.unit}, its limit is {limit:.1f}"
+        """End of the unit of the two numbers, behind `degrees`."""
+        return {"range": "", "speed": "/s", "acceleration": "/s^2"}[self.what]
 
 
 class Recording:
@@ -227,17 +223,6 @@ def _note(
             worst[what] = Violation(joint=joint, what=what, measured=value, limit=limit, at=at, explained=most)
         if before is not None:
             worst[what] = replace(worst[what], explained=max(most, before.explained))
-
-
-def stops(recording: Recording, start: Seconds, end: Seconds) -> int:
-    """Count how often the joints' speed falls under 1 % of its peak between `start` and `end`, once it was above."""
-    times = np.array(recording.times[1:])
-    inside = (times > start) & (times <= end)
-    speed = np.linalg.norm(recording.speeds[inside], axis=1)
-    moving = speed >= 0.01 * speed.max()
-    # The last samples before the end are the end of the motion, not a stop in it.
-    first, last = int(np.argmax(moving)), len(moving) - int(np.argmax(moving[::-1]))
-    return int(np.sum(np.diff(moving[first:last].astype(int)) == -1))
 
 
 def unused(limits: Iterable[JointLimit], fastest: Mapping[str, float]) -> tuple[str, ...]:

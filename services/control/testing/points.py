@@ -12,10 +12,9 @@ from engage_hri.schemas.behaviors import BlockBehavior, Locomotion, Speech
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.body import Arrived, BehaviorRefused, Body, MouthShape, Reached, Spoke
-from engage_hri.services.control.testing.asked import ONE_INSTANT
-from engage_hri.services.control.testing.laws import broken, listed, ms
+from engage_hri.services.control.testing.findings import broken, listed, ms
 from engage_hri.services.control.testing.stage import Stage, default, done, times
-from engage_hri.services.control.testing.suite import Suite, by_each
+from engage_hri.services.control.testing.suite import ONE_INSTANT, Suite, by_each
 
 PROMPT = 0.05
 """Seconds within which a body reports a point."""

@@ -8,8 +8,8 @@ from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.contract.body import Arrived, Body, MovementAuthority, Progress, Reached, Revocation
-from engage_hri.services.control.testing.laws import NEVER_ENDS, broken, listed, ms
+from engage_hri.services.control.contract.body import Arrived, Body, MovementAuthority, Progress, Reached
+from engage_hri.services.control.testing.findings import NEVER_ENDS, broken, listed, ms
 
 PATIENCE: Seconds = 30.0
 """Time within which any behavior comes to its next hold point, or to its end."""
@@ -107,11 +107,13 @@ class Stage:
         """Wait for the end. Raises LawBroken if it does not come, and what the body raises."""
         await asyncio.wait([self.task], timeout=patience)
         if not self.task.done():
-            is_free = self.authority.revoked is None and self.authority.covers(self.authority.points[-1])
+            how = self.authority.revoked
+            cut = " of its being taken over" if how == "taken_over" else " of its abort" if how else ""
+            is_free = how is None and self.authority.covers(self.authority.points[-1])
             broken(
                 self.next_point,
                 behavior=self.behavior,
-                expected=f"an end within {ms(patience)}{self._cut}",
+                expected=f"an end within {ms(patience)}{cut}",
                 measured=self.told,
                 advice="does `perform` look at the authority while it moves and waits (`watch`, `granted`)?",
                 cause=f"{NEVER_ENDS}, having passed {listed(self.passed)}" if is_free else "",
@@ -131,15 +133,6 @@ class Stage:
     def next_point(self) -> str:
         """The sync point that comes next; empty: none."""
         return next((sync for sync in self.authority.points if sync not in self.passed), "")
-
-    @property
-    def _cut(self) -> str:
-        ended: dict[Revocation, str] = {
-            "relax": " of its abort",
-            "freeze": " of its abort",
-            "taken_over": " of its being taken over",
-        }
-        return ended[self.authority.revoked] if self.authority.revoked else ""
 
     @classmethod
     async def end_all(cls) -> None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from functools import wraps
@@ -14,16 +15,33 @@ import pytest
 import pytest_asyncio
 from msgspec.structs import replace
 
-from engage_hri.schemas.behavior_types import sync_points
-from engage_hri.schemas.behaviors import BlockBehavior, Gesture, Pointing, Speech
-from engage_hri.schemas.body import BodyPose, Capabilities
+from engage_hri.schemas.behavior_types import TYPES, sync_points
+from engage_hri.schemas.behaviors import (
+    BlockBehavior,
+    Expression,
+    Face,
+    FaceFacs,
+    FaceLexeme,
+    FaceShift,
+    Gaze,
+    GazeShift,
+    Gesture,
+    Head,
+    HeadDirectionShift,
+    Mark,
+    Pointing,
+    Pose,
+    Posture,
+    PostureShift,
+    Speech,
+    Wait,
+)
+from engage_hri.schemas.body import BodyPose
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Radians, Seconds, Vector
-from engage_hri.schemas.world import World
+from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.contract.body import Body, BodyState
-from engage_hri.services.control.testing.asked import AIMED, BEHAVIORS, HOLDS, WORLD
-from engage_hri.services.control.testing.findings import findings_of
-from engage_hri.services.control.testing.laws import (
+from engage_hri.services.control.testing.findings import (
     OTHER_WAY,
     Finding,
     LawBroken,
@@ -31,6 +49,7 @@ from engage_hri.services.control.testing.laws import (
     aside,
     broken,
     degrees,
+    findings_of,
     listed,
     ms,
     named,
@@ -39,6 +58,50 @@ from engage_hri.services.control.testing.motions import Array
 from engage_hri.services.control.testing.stage import PATIENCE, Connection, Stage, default, standing, still_running
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 
+LOOKS = Gaze | GazeShift | HeadDirectionShift
+AIMED = LOOKS | Pointing
+WORLD = World(
+    entities=(
+        Entity(id="human", kind="person", position=(1.3, 0.0, 1.2)),
+        Entity(id="near-right", kind="object", position=(0.45, -0.25, 0.73), radius=0.03),
+        Entity(id="far-left", kind="object", position=(0.70, 0.30, 0.73), radius=0.03),
+    )
+)
+BEHAVIORS: tuple[BlockBehavior, ...] = (
+    Gaze(id="gaze", target="near-right"),
+    GazeShift(id="gazeShift", target="far-left"),
+    HeadDirectionShift(id="headDirectionShift", target="near-right"),
+    Pointing(id="pointing", target="far-left"),
+    Gesture(id="gesture", lexeme="BEAT"),
+    Head(id="head", lexeme="NOD"),
+    Head(id="nods", lexeme="NOD", repetition=3),
+    Face(id="face", expressions=(Expression(lexeme="SMILE"), Expression(lexeme="RAISE_BROWS"))),
+    FaceLexeme(id="faceLexeme", lexeme="SMILE"),
+    FaceFacs(id="faceFacs", au=12),
+    FaceShift(id="faceShift", lexeme="SMILE"),
+    Posture(id="posture", lexeme="LEAN_FORWARD"),
+    PostureShift(id="postureShift", lexeme="TURN_LEFT"),
+    Pose(id="pose", lexeme="LEANING_BACKWARD"),
+    Speech(id="speech", text="This piece, please.", marks=(Mark("m", 5),)),
+    Wait(id="wait", duration=0.5),
+)
+
+
+def behaviors_in(world: World) -> tuple[BlockBehavior, ...]:
+    """Direct the behaviors of the suite to what there is in another world: to its first and to its last object.
+
+    world: at least one entity.
+    """
+    ids = [entity.id for entity in (*world.objects, *world.people, *world.entities)]
+    last = ids[max(1, len(world.objects) - 1) % len(ids)]
+    places = {"near-right": ids[0], "far-left": last}
+    return tuple(replace(each, target=places[each.target]) if isinstance(each, AIMED) else each for each in BEHAVIORS)
+
+
+HOLDS = {name: row.holds for name, row in TYPES.items() if row.holds}
+"""Where each type can wait, as the realizer knows it."""
+ONE_INSTANT = {name: row.one_instant for name, row in TYPES.items() if row.one_instant}
+"""Points of a type that always coincide, as the realizer knows it."""
 ON_AXIS: Radians = math.radians(1.0)
 STILL: Radians = math.radians(0.1)
 """What a joint that stands still may move all the same."""
@@ -48,7 +111,7 @@ Aimed = TypeVar("Aimed", bound=AIMED)
 PLUGIN = "engage_hri.services.control.testing.plugin"
 
 
-class Suite:
+class Suite(ABC):
     """Base of the contract suite. A subclass says in `make` how to make the body, and states how exact it is.
 
     tolerance: stated error of its estimates, seconds from each sync point to the next.
@@ -75,9 +138,9 @@ class Suite:
     fastest: dict[str, float] | None = None
     """The fastest that each joint was seen to be, radians per second; None: nobody asks."""
 
+    @abstractmethod
     def make(self) -> Body:
         """Make the body, in the running event loop, not connected."""
-        raise NotImplementedError
 
     def faults(self) -> Mapping[str, Callable[[], Body]]:
         """Name faults, and say how to make the body that has each: a motor that stalls, a connection that is lost."""
@@ -370,6 +433,11 @@ def by_each(which: Which | UnionType | type = object, lacks: str = "no such beha
     return of_a_body
 
 
+def has_joints(behavior: BlockBehavior) -> bool:
+    """True for what is done with joints."""
+    return not isinstance(behavior, Speech | Wait)
+
+
 def does_not_apply(why: str) -> NoReturn:
     """End a test: its law cannot be judged by this body."""
     pytest.skip(why)
@@ -388,9 +456,3 @@ def trials(count: int) -> Callable[[Any], Any]:
 def pose_angles(pose: BodyPose | None) -> dict[str, Radians]:
     """The angle of each joint of a pose; of none: nothing."""
     return {} if pose is None else angles(pose)
-
-
-def unchecked(capabilities: Capabilities, behaviors: Iterable[BlockBehavior]) -> list[str]:
-    """Types of behaviors that a body has and the suite cannot ask for."""
-    known = {type_name(each) for each in behaviors}
-    return [kind for kind in capabilities.types if kind not in known]

@@ -3,8 +3,18 @@
 Where time is real the loop does not stand still for them: before a new text is estimated, a tenth of a second may go
 by, in which other work goes on. What is not there by then comes later; whoever needs it waits for it.
 
-A synthesizer that freezes is ended after `limit`, and another one is started. A text at which one died is tried once
-more at once; what fails then is refused for a while, and not for ever: it may have died of something else.
+Engines freeze, and die of odd texts. One that is waited for without end stands for all texts after it, one that is
+started again at once dies again at once, and a text that is refused for ever may have died of something else. So the
+process goes from state to state, and `_go_on` is the only place that moves it, whenever something may have come: a
+question, an answer, the end of the time that it has.
+
+    no process ──> being made ──Made──> idle ──a phrase──> saying ──its sound, or a refusal──> idle
+        ^              │                                     │
+        ├──── lost: it has ended, or has not answered in time ┘  (`_lose`; `on_fault` is told)
+        └── 60 s ── broken: the synthesizer cannot be made, or was lost twice at that; all is refused
+
+A text at which it died is tried once more at once; what fails a second time is refused for a minute (`_Refused`). One
+at which it froze is refused for a second at once: whoever waits for it has waited long enough.
 """
 
 import asyncio
@@ -17,6 +27,7 @@ import weakref
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from math import inf
 from typing import NamedTuple
 
 import msgspec
@@ -106,14 +117,7 @@ class Studio:
 
     async def asked(self, phrases: Sequence[Phrase], patience: Seconds) -> None:
         """Wait until phrases are there, or for as long as `patience`. What the process says is heard (`listen`)."""
-        bell = Bell()
-        self._bells.append(bell)
-        deadline = bell.now() + patience
-        try:
-            while not self.ask(phrases, 0.0) and bell.now() < deadline:
-                await bell.wait(deadline)
-        finally:
-            self._bells.remove(bell)
+        await self._rung(lambda: self.ask(phrases, 0.0), patience)
 
     def ask(self, phrases: Sequence[Phrase], wait: Seconds, *, first: bool = False) -> bool:
         """Ask for phrases to be synthesized, in this order, and wait until they are there or the time is over.
@@ -123,7 +127,10 @@ class Studio:
 
         Returns whether all are there.
         """
-        self._forget_refusals(phrases)
+        for phrase in phrases:
+            found = self._known.get(phrase)
+            if isinstance(found, _Refused) and time.monotonic() >= found.until:
+                self._size -= _bytes(self._known.pop(phrase))
         wanted = [phrase for phrase in phrases if phrase not in self._known]
         self._line.update(dict.fromkeys(wanted))
         for phrase in reversed(wanted) if first else ():
@@ -149,13 +156,17 @@ class Studio:
 
     async def made(self) -> None:
         """Wait until the synthesizer is there. Raises SynthesisFailed."""
+        await self._rung(lambda: self.make(0.0), inf)
+
+    async def _rung(self, is_done: Callable[[], bool], patience: Seconds) -> None:
+        """Look at each answer whether something is done, for as long as `patience`."""
         bell = Bell()
-        self._bells.append(bell)
+        unwatch, deadline = self.watch(bell), bell.now() + patience
         try:
-            while not self.make(0.0):
-                await bell.wait(bell.now() + 1.0)
+            while not is_done() and bell.now() < deadline:
+                await bell.wait(deadline)
         finally:
-            self._bells.remove(bell)
+            unwatch()
 
     def listen(self, loop: asyncio.AbstractEventLoop) -> None:
         """Take answers as they come, while the loop runs; only where its time is real."""
@@ -193,17 +204,14 @@ class Studio:
         if self._broken is not None and time.monotonic() >= self._broken.until:
             self._broken = None
         if self._broken is not None:
-            self._refuse_all(self._broken)
+            for phrase in list(self._line):
+                self._keep(phrase, self._broken)
         while self._line and next(iter(self._line)) in self._known:
             self._line.popitem(last=False)
         if self._process is None and self._broken is None:
             self._start()
         if self.rate and self._asked is None and self._line:
-            self._send(next(iter(self._line)))
-
-    def _look_again(self) -> None:
-        self._timer = None
-        self._go_on()
+            self._tell(next(iter(self._line)))
 
     def _left(self, asked: _Asked) -> Seconds:
         """Seconds that the process still has for what it was asked."""
@@ -216,7 +224,7 @@ class Studio:
             self._timer.cancel()
             self._timer = None
         if asked is not None and self._listens is not None:
-            self._timer = self._listens.call_later(max(0.0, self._left(asked)), self._look_again)
+            self._timer = self._listens.call_later(max(0.0, self._left(asked)), self._go_on)
 
     def _waited(self, deadline: Seconds) -> bool:
         """Let the loop stand still until there is something to take, or some time has passed.
@@ -234,13 +242,6 @@ class Studio:
         self._push()
         return True
 
-    def _forget_refusals(self, phrases: Sequence[Phrase]) -> None:
-        """Forget what came of phrases that may be tried again."""
-        for phrase in phrases:
-            found = self._known.get(phrase)
-            if isinstance(found, _Refused) and time.monotonic() >= found.until:
-                self._size -= _bytes(self._known.pop(phrase))
-
     def _start(self) -> None:
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
         self._process = process = subprocess.Popen(
@@ -254,15 +255,12 @@ class Studio:
         os.set_blocking(process.stdin.fileno(), False)  # a long text does not fit into the pipe of one that is frozen
         if self._listens is not None:
             self._listens.add_reader(process.stdout.fileno(), self._go_on)
-        self._expect(_Asked(None, time.monotonic()))
-        self._write(packed(self._order))
+        self._tell(None)
 
-    def _send(self, phrase: Phrase) -> None:
+    def _tell(self, phrase: Phrase | None) -> None:
+        """Tell the process what it is to say. phrase: None: the synthesizer to make."""
         self._expect(_Asked(phrase, time.monotonic()))
-        self._write(packed(phrase))
-
-    def _write(self, message: bytes) -> None:
-        self._unsent += message
+        self._unsent += packed(self._order if phrase is None else phrase)
         self._push()
 
     def _push(self) -> None:
@@ -296,21 +294,19 @@ class Studio:
             self._answered(msgspec.msgpack.decode(content, type=Answer))
 
     def _answered(self, answer: Answer) -> None:
-        asked = self._asked
+        assert self._asked is not None
+        phrase = self._asked.phrase
         self._expect(None)
-        if asked is not None:
-            self._died_at.pop(asked.phrase, None)
-            phrase = asked.phrase
-            match answer:
-                case Made(rate):
-                    self.rate = rate
-                case Failed(fault) if phrase is None:
-                    self._broken = self._refused(fault)
-                    self._refuse_all(self._broken)
-                case Failed(fault) if phrase is not None:
-                    self._keep(phrase, self._refused(fault))
-                case Spoken(clause) if phrase is not None:
-                    self._keep(phrase, clause)
+        self._died_at.pop(phrase, None)
+        match answer, phrase:
+            case Made(rate), _:
+                self.rate = rate
+            case Failed(fault), None:
+                self._broken = self._refused(fault)
+            case Failed(fault), Phrase():
+                self._keep(phrase, self._refused(fault))
+            case Spoken(clause), Phrase():
+                self._keep(phrase, clause)
         self._ring()
 
     def _keep(self, phrase: Phrase, result: Clause | _Refused) -> None:
@@ -338,7 +334,6 @@ class Studio:
                 fault = replace(fault, reason=f"{fault.reason}, for the second time; refused for {AGAIN:.0f} s")
             if asked.phrase is None and (is_second or is_frozen):
                 self._broken = self._refused(replace(fault, advice="its own words are on standard error"))
-                self._refuse_all(self._broken)
             elif asked.phrase is not None and (is_second or is_frozen):
                 self._keep(asked.phrase, self._refused(fault, AGAIN if is_second else NEWS))
         self.on_fault(fault)
@@ -346,11 +341,6 @@ class Studio:
 
     def _refused(self, fault: Fault, seconds: Seconds = AGAIN) -> _Refused:
         return _Refused(fault, time.monotonic() + seconds)
-
-    def _refuse_all(self, refused: _Refused) -> None:
-        """Nothing can be said."""
-        for phrase in list(self._line):
-            self._keep(phrase, refused)
 
     def _ring(self) -> None:
         for bell in self._bells:

@@ -18,8 +18,8 @@ from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.mujoco.body import MujocoBody
 from engage_hri.services.control.mujoco.faults import OURS
 from engage_hri.services.control.testing import WORLD, Stage, performed, times
-from engage_hri.services.control.testing.suite import Suite
-from engage_hri.services.control.testing.witness import ARMS, LOOKS, Witness
+from engage_hri.services.control.testing.truth import ARMS, LOOKS, Witness
+from tests.control.watching import Bystander
 from tests.random_cases import share_of
 
 POINT = Pointing(id="point", target="near-right", mode="RIGHT_HAND")
@@ -206,7 +206,7 @@ async def test_with_each_fault_no_untrue_point_and_an_end_by_name(kind: str, cro
     chance = Random(f"{kind} {len(crowd)}")
     body = sick()
     await body.home()
-    witness = Witness(Suite(), body)
+    witness = Witness(Bystander(), body)
     body.switch_faults([BodyFault(kind=kind)])
     for number in range(14):
         await asyncio.sleep(chance.choice((0.0, chance.uniform(0.0, 0.5), chance.uniform(0.0, 2.5))))

@@ -15,7 +15,7 @@ from engage_hri.services.control.mujoco.body import MujocoBody
 from engage_hri.services.control.mujoco.commands import Commands
 from engage_hri.services.control.mujoco.faults import OURS
 from engage_hri.services.control.testing import WORLD, Stage
-from engage_hri.services.control.testing.witness import ARMS, LOOKS
+from engage_hri.services.control.testing.truth import ARMS, LOOKS
 
 PARTS = ("head", "torso", "left_arm", "right_arm")
 SETTLED = 0.06

@@ -17,7 +17,7 @@ from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.reachy_mini.moves import FRAME, NEAR, SHORTEST, Moves, settling
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 from engage_hri.services.control.testing import WORLD, Stage, performed
-from engage_hri.services.control.testing.laws import aside
+from engage_hri.services.control.testing.findings import aside
 from engage_hri.services.control.testing.suite import ON_AXIS
 from tests.control.reachy_mini.fake import FakeDaemon
 from tests.control.reachy_mini.limits import too_much

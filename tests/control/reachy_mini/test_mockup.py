@@ -24,7 +24,7 @@ from engage_hri.services.control.reachy_mini.connection import connected
 from engage_hri.services.control.reachy_mini.link import Daemon
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 from engage_hri.services.control.testing import WORLD, BodyContract, LawBroken, Stage, performed
-from engage_hri.services.control.testing.laws import aside
+from engage_hri.services.control.testing.findings import aside
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.control.reachy_mini.daemon import Mockup, running
 from tests.control.reachy_mini.fake import HOME, FakeDaemon

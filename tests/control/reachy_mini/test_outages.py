@@ -14,7 +14,7 @@ from engage_hri.services.control.contract.body import BehaviorRefused, BodyFaile
 from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 from engage_hri.services.control.testing import WORLD, Stage, performed
-from engage_hri.services.control.testing.laws import aside
+from engage_hri.services.control.testing.findings import aside
 from engage_hri.services.control.testing.suite import ON_AXIS
 from tests.control.reachy_mini.fake import HOME, FakeDaemon
 from tests.control.reachy_mini.limits import too_much
