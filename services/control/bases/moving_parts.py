@@ -13,11 +13,9 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.contract.bell import Bell
 from engage_hri.services.control.contract.body import MovementAuthority
-from engage_hri.services.control.figure.choreography import is_shift
-from engage_hri.services.control.figure.course import Course
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import Path
-from engage_hri.services.control.motion.points import WalkPoint
+from engage_hri.services.control.motion.points import MotionPlan, WalkPoint, is_shift
 from engage_hri.services.control.motion.track import Track
 
 
@@ -34,9 +32,10 @@ class Run:
     given its parts. holding: it waits at a hold point, standing or still coming to a stop.
     """
 
+    course: MotionPlan
     motion: Motion
 
-    def __init__(self, behavior: BlockBehavior, course: Course, authority: MovementAuthority) -> None:
+    def __init__(self, behavior: BlockBehavior, course: MotionPlan, authority: MovementAuthority) -> None:
         self.behavior, self.course, self.authority = behavior, course, authority
         self.bell = Bell()
         self.pending: list[WalkPoint] = list(course.points)

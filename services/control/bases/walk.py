@@ -45,7 +45,6 @@ from engage_hri.services.control.contract.body import (
 )
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.motion.points import WalkPoint
-from engage_hri.services.control.voice import speaking
 
 FREEZE: Seconds = 0.5
 """Seconds that a part stands still when it is told to freeze, before it relaxes."""
@@ -110,7 +109,7 @@ class WalkingBody(Body, Generic[R]):
     # -- the walk -----------------------------------------------------------------------------------------------
 
     def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-        return speaking.wait(behavior, authority) if isinstance(behavior, Wait) else self.walk(behavior, authority)
+        return wait(behavior, authority) if isinstance(behavior, Wait) else self.walk(behavior, authority)
 
     async def home(self, parts: tuple[str, ...] = ()) -> None:
         going, watches, bell = (
@@ -222,3 +221,25 @@ class WalkingBody(Body, Generic[R]):
         until = run.motion.end + FREEZE
         while self.moves.owns(run) and not run.bell.is_past(until):
             await run.bell.wait(until)
+
+
+async def wait(behavior: Wait, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
+    """Let the duration of the behavior pass, and then hold until its end may be passed."""
+    bell = Bell()
+    begin = bell.now()
+    due = begin + (behavior.duration or 0.0)
+    unwatch = authority.watch(bell.ring)
+    try:
+        yield Reached("start", begin, begin)
+        while not bell.is_past(due) and authority.revoked is None:
+            await bell.wait(due)
+        left = due
+        if authority.revoked is None and not authority.covers("end"):
+            yield Arrived("end", due)
+            while authority.revoked is None and not authority.covers("end"):
+                await bell.wait(inf)
+            left = bell.now()
+        if authority.revoked is None:
+            yield Reached("end", left, due)
+    finally:
+        unwatch()

@@ -1,4 +1,4 @@
-"""Speech and waiting on loop time: the behaviors of a body that move no joint.
+"""Speech on loop time: a behavior of a body that moves no joint.
 
 A voice hands sound over `lead` seconds before it is heard. So each word has two instants: when it is handed over, and
 whether it may be is decided, and when it is heard and told of. Without a sound device they are one.
@@ -12,7 +12,7 @@ from typing import Protocol
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import Speech, Wait
+from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.bell import EARLY, Bell
 from engage_hri.services.control.contract.body import (
@@ -345,25 +345,3 @@ class _Utterance:
         self._lips = self._lips[passed[-1] if passed else 0 :]
         if self._lips:
             self._on_lips([MouthShape(self._begin + each.at, each.opening, each.width) for each in self._lips])
-
-
-async def wait(behavior: Wait, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-    """Let the duration of the behavior pass, and then hold until its end may be passed."""
-    bell = Bell()
-    begin = bell.now()
-    due = begin + (behavior.duration or 0.0)
-    unwatch = authority.watch(bell.ring)
-    try:
-        yield Reached("start", begin, begin)
-        while not bell.is_past(due) and authority.revoked is None:
-            await bell.wait(due)
-        left = due
-        if authority.revoked is None and not authority.covers("end"):
-            yield Arrived("end", due)
-            while authority.revoked is None and not authority.covers("end"):
-                await bell.wait(inf)
-            left = bell.now()
-        if authority.revoked is None:
-            yield Reached("end", left, due)
-    finally:
-        unwatch()

@@ -93,7 +93,7 @@ async def test_the_plan_and_the_joints_agree_within_the_stated_error_while_it_is
     body.see(WORLD)
 
     def look(at: float) -> None:
-        plan, measured = body._plan(), body.bench.measured
+        plan, measured = body.planned(), body.bench.measured
         for joint, angle in measured.items():
             part = kinematics.LIMIT[joint].part
             if part in worst:
