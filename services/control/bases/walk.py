@@ -46,8 +46,6 @@ from engage_hri.services.control.contract.body import (
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.motion.points import WalkPoint
 
-FREEZE: Seconds = 0.5
-"""Seconds that a part stands still when it is told to freeze, before it relaxes."""
 CATCHES_UP: Seconds = 0.02
 """Seconds between two looks at whether it has come to a target that has moved."""
 
@@ -59,7 +57,7 @@ class WalkingBody(Body, Generic[R]):
     """
 
     moves: MovingParts[R]
-    patience: Seconds = PATIENCE
+    stuck_after: Seconds = PATIENCE
     """Seconds without any way after which joints on their way home are stuck."""
 
     def __init__(self) -> None:
@@ -114,7 +112,7 @@ class WalkingBody(Body, Generic[R]):
     async def home(self, parts: tuple[str, ...] = ()) -> None:
         going, watches, bell = (
             self.moves.go_home(parts),
-            defaultdict[str, Watch](lambda: Watch(self.patience)),
+            defaultdict[str, Watch](lambda: Watch(self.stuck_after)),
             Bell(),
         )
         self.moves.homeward.append(bell)
@@ -217,8 +215,7 @@ class WalkingBody(Body, Generic[R]):
             yield Reached("end", at := self._loop.time(), at)
 
     async def _freeze(self, run: R) -> None:
-        self.moves.stop(run)
-        until = run.motion.end + FREEZE
+        until = self.moves.stop(run)
         while self.moves.owns(run) and not run.bell.is_past(until):
             await run.bell.wait(until)
 

@@ -350,9 +350,9 @@ class Torso(ClearOfTable):
             self._wait_for_reach()
             finished(self.give_way())
 
-    def stop(self, run: Run) -> None:
-        super().stop(run)
+    def stop(self, run: Run) -> Seconds:
         self.attention.expect("", 0.0, self.clock.time())
+        return super().stop(run)
 
     # -- targets that move ----------------------------------------------------------------------------------------
 

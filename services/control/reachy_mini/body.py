@@ -66,7 +66,7 @@ class ReachyMini(LinkedBody, WalkingBody[Run]):
             body="reachy_mini", types=tuple(map(type_name, courses.TYPES)), parts=("head", "torso", "face"),
             joints=joints.LIMITS,
         )  # fmt: skip
-        self.patience = self.settings.patience
+        self.stuck_after = self.settings.patience
         self.moves = Moves(self._loop, self.settings)
         self._idling = Idling(self.settings.lag, is_alive=alive)
         self._sent = ""
@@ -133,7 +133,7 @@ class ReachyMini(LinkedBody, WalkingBody[Run]):
         if self.trouble is not None:
             raise BehaviorRefused(replace(self.trouble, where=behavior.id))
         course = courses.course(behavior, self.moves.circumstances(self.moves.world))
-        return self.moves.set_out(Run(behavior, course, authority, self.patience))
+        return self.moves.set_out(Run(behavior, course, authority, self.stuck_after))
 
     def check(self, run: Run) -> None:
         if self.trouble is not None and (run.authority.revoked is None or not self.moves.owns(run)):
@@ -191,7 +191,7 @@ class ReachyMini(LinkedBody, WalkingBody[Run]):
         now = self._loop.time()
         ends = {name: track.motion.end for name, track in self.moves.tracks.items()}
         return any(
-            now < end + self.settings.lag or (now < end + self.patience and self._off_home(name).share > 1.0)
+            now < end + self.settings.lag or (now < end + self.stuck_after and self._off_home(name).share > 1.0)
             for name, end in ends.items()
         )
 
