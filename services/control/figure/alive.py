@@ -13,9 +13,11 @@ from math import inf, radians, sin, tau
 
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.services.control.contract.body import MouthShape
-from engage_hri.services.control.contract.extras import Gate, smooth
 from engage_hri.services.control.contract.variability import chance, normal
 
+GIVES_WAY: Seconds = 0.2
+COMES_BACK: Seconds = 1.5
+"""Seconds in which idle motion stops for a behavior, and in which it comes back."""
 BETWEEN_BLINKS: Seconds = 60.0 / 17.0
 """Mean of the time between two blinks: at rest people blink 17 times a minute (Bentivoglio et al., Movement Disorders
 12, 1997; rates are log-normal there, and so are the times between blinks here)."""
@@ -34,6 +36,31 @@ STIRRING: Mapping[str, tuple[float, Seconds, Seconds]] = {
     "right_mouth_corner": (0.03, 9.1, 5.3), "lips": (0.015, 6.1, 3.7),
 }  # fmt: skip
 """Amplitude and the two periods of the motion of each joint of the face, as shares of its way."""
+
+
+class Gate:
+    """Share of the idle motion that is let through: it goes to 0 when something begins, and comes back after it."""
+
+    def __init__(self, *, is_open: bool = True) -> None:
+        self._since: Seconds = -inf
+        self._from = float(is_open)
+        self._is_open = is_open
+
+    def share(self, t: Seconds, *, is_open: bool) -> float:
+        """The share at t, of a gate that is open or closed from now on."""
+        if is_open != self._is_open:
+            self._from, self._since, self._is_open = self._at(t), t, is_open
+        return self._at(t)
+
+    def _at(self, t: Seconds) -> float:
+        seconds = COMES_BACK if self._is_open else GIVES_WAY
+        return self._from + (float(self._is_open) - self._from) * smooth((t - self._since) / seconds)
+
+
+def smooth(done: float) -> float:
+    """Way of a movement of least jerk, 0 to 1, when this share of its time is over."""
+    x = min(max(done, 0.0), 1.0)
+    return x * x * x * (10.0 + x * (6.0 * x - 15.0))
 
 
 class Blinks:

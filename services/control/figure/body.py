@@ -23,12 +23,13 @@ from engage_hri.services.control.contract.body import (
     BehaviorRefused,
     BodyFailed,
     BodyState,
+    Idle,
     MouthShape,
     MovementAuthority,
     Progress,
     Reached,
+    Seen,
 )
-from engage_hri.services.control.contract.extras import Idle, Seen
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.contract.variability import Deviations
 from engage_hri.services.control.figure import choreography, kinematics, tracks

@@ -22,8 +22,7 @@ from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.bases.watch import Off, Watch, farthest, nearest
 from engage_hri.services.control.config import ControlConfig, Variability
-from engage_hri.services.control.contract.body import Body, BodyFailed, MovementAuthority, Progress
-from engage_hri.services.control.contract.extras import Idle
+from engage_hri.services.control.contract.body import Body, BodyFailed, Idle, MovementAuthority, Progress
 from engage_hri.services.control.figure import tracks
 from engage_hri.services.control.figure.body import FigureBody
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire, repertoire_of

@@ -17,8 +17,8 @@ from engage_hri.services.control.contract.bell import Bell
 from engage_hri.services.control.contract.body import (
     BehaviorRefused,
     BodyState,
+    Seen,
 )
-from engage_hri.services.control.contract.extras import Seen
 from engage_hri.services.control.figure.kinematics import HAND_TO_TARGET, TABLE_TOP
 from engage_hri.services.control.mujoco.ik import ON_AXIS, Chain, Solution
 from engage_hri.services.control.mujoco.stage import Angles, DescribedStage

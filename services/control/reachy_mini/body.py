@@ -25,17 +25,16 @@ from engage_hri.services.control.contract.body import (
     BehaviorRefused,
     BodyFailed,
     BodyState,
+    Idle,
     MovementAuthority,
 )
-from engage_hri.services.control.contract.extras import Idle
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import choreography
 from engage_hri.services.control.figure.estimates import wait_estimate
 from engage_hri.services.control.motion.points import WalkPoint
-from engage_hri.services.control.reachy_mini import courses, joints, messages
+from engage_hri.services.control.reachy_mini import courses, joints, link
 from engage_hri.services.control.reachy_mini.idling import Idling
-from engage_hri.services.control.reachy_mini.link import GAP, Connect, Daemon, LinkedBody
-from engage_hri.services.control.reachy_mini.messages import Measured
+from engage_hri.services.control.reachy_mini.link import GAP, Connect, Daemon, LinkedBody, Measured
 from engage_hri.services.control.reachy_mini.moves import Moves, Run
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 
@@ -86,7 +85,7 @@ class ReachyMini(LinkedBody, WalkingBody[Run]):
         commanded = moves.commanded(now)
         busy = {name for name, track in moves.tracks.items() if name in moves.runs or track.is_moving(now)}
         added = self._idling.added(now, commanded, busy)
-        text = messages.target({joint: angle + added.get(joint, 0.0) for joint, angle in commanded.items()})
+        text = link.target({joint: angle + added.get(joint, 0.0) for joint, angle in commanded.items()})
         before, self._sent = self._sent, text
         return text if text != before else None
 
