@@ -5,8 +5,8 @@ from functools import cache
 
 from msgspec import Struct
 
+from engage_hri.schemas.behavior_types import SYNC_POINTS
 from engage_hri.schemas.behaviors import BlockBehavior, GazeShift, HeadDirectionShift
-from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.services.control.motion.path import Leg
 
 
