@@ -83,7 +83,7 @@ class OnePart(MovingParts[OnePartRun]):
         self.shift: BlockBehavior | None = None
 
     def goal_of(self, run: OnePartRun) -> Angles:
-        """Where a behavior has the joints now: at the end where the part rests, unless it goes elsewhere itself."""
+        """Goal of a behavior now: at the end where the part rests, unless it goes elsewhere itself."""
         return run.goals.get(run.sync, self.goal)
 
     def take_over(self, run: OnePartRun) -> None:
@@ -287,7 +287,7 @@ class OrdinaryBody(WalkingBody[OnePartRun]):
                 raise refused(behavior, reason)
 
     def goals(self, behavior: BlockBehavior, world: World) -> Goals:
-        """Where a behavior needs the joints, by the first point of each instant. Raises BehaviorRefused."""
+        """Goals of a behavior by the first point of each instant. Raises BehaviorRefused."""
         return by_instant(behavior, self._way(behavior, world))
 
     def _seconds(self, here: Angles, goal: Angles) -> Seconds:

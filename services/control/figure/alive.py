@@ -132,7 +132,7 @@ def closure(since: Seconds) -> float:
 CHANGE: Seconds = 0.09
 """Seconds in which the lips go from one shape to the next, half of them before the next begins, as people's do: as
 quickly as the joints of the face may."""
-OPEN, PARTED, SPREAD = 0.7, 0.8, 0.35
+OPEN, PARTED, WIDENED = 0.7, 0.8, 0.35
 """Shares of the way left that jaw and lips take when the mouth is wide open, and its corners when it is spread."""
 Shape = tuple[float, float]
 
@@ -181,5 +181,5 @@ class Mouth:
             return {}
         by = {"jaw": OPEN * opening * (1.0 - face["jaw"]), "lips": PARTED * opening * (1.0 - face["lips"])}
         for corner in ("left_mouth_corner", "right_mouth_corner"):
-            by[corner] = SPREAD * width * (1.0 - abs(face[corner]))
+            by[corner] = WIDENED * width * (1.0 - abs(face[corner]))
         return by
