@@ -59,7 +59,7 @@ LAYERS = {
     "services/text": "ear > marks > pieces > patterns > ends listening",
     "services/bus": "memory zenoh > answering certificates > interface > payloads subscription > samples often sight"
     " > config journal keyring",
-    "services/control": "mujoco > reachy_mini service testing torso > bases calibrating serving > figure voice"
+    "services/control": "mujoco reachy_mini torso > figure service testing > bases calibrating serving voice"
     " > contract > config motion",
     "services/commandline": "look robot study talk > app bodies embedding > shell",
     "services/client": "language_models > robot > orders > feeds people > chunking event_stream inputs",

@@ -20,14 +20,13 @@ from engage_hri.services.control.bases.moving_parts import MovingParts
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import tracks
 from engage_hri.services.control.figure.aiming import TRUNK, UPRIGHT, Aim
-from engage_hri.services.control.figure.course import Course, Situation
+from engage_hri.services.control.figure.course import Course, Situation, arm_time
 from engage_hri.services.control.figure.estimates import is_arm
-from engage_hri.services.control.figure.pace import arm_time
+from engage_hri.services.control.figure.runs import Run
 from engage_hri.services.control.figure.tracks import LIFTS, PartTrack, are_clear, lifted
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import Leg, Path
 from engage_hri.services.control.motion.track import SAME, Trunk
-from engage_hri.services.control.torso.runs import Run
 from engage_hri.services.runtime.steps import Steps
 
 APART: Radians = radians(4.0)

@@ -30,6 +30,8 @@ class Run(moving_parts.Run):
     began: when it was given its parts.
     """
 
+    course: Course
+
     def __init__(
         self,
         behavior: BlockBehavior,

@@ -17,20 +17,18 @@ from engage_hri.services.control.bases.moving_parts import Clock
 from engage_hri.services.control.contract.body import MovementAuthority
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.contract.variability import Deviations
-from engage_hri.services.control.figure import choreography, kinematics, tracks
+from engage_hri.services.control.figure import choreography, head, kinematics, tracks
 from engage_hri.services.control.figure.aiming import NECK, TRUNK, Aim
-from engage_hri.services.control.figure.course import Course, Situation
+from engage_hri.services.control.figure.course import Course, Situation, return_time
 from engage_hri.services.control.figure.estimates import Added, going_home, motion_estimate
-from engage_hri.services.control.figure.pace import return_time
+from engage_hri.services.control.figure.head import Fixation
 from engage_hri.services.control.figure.repertoire import Repertoire
+from engage_hri.services.control.figure.runs import Run
+from engage_hri.services.control.figure.table_clearance import ARMS, SHORTEST, ClearOfTable, way_along
 from engage_hri.services.control.figure.tracks import PartTrack
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import JointMotion, Leg, Path, resting
-from engage_hri.services.control.motion.points import WalkPoint
-from engage_hri.services.control.torso import head
-from engage_hri.services.control.torso.head import Fixation
-from engage_hri.services.control.torso.runs import Run
-from engage_hri.services.control.torso.table_clearance import ARMS, SHORTEST, ClearOfTable, way_along
+from engage_hri.services.control.motion.points import WalkPoint, is_shift
 from engage_hri.services.runtime.steps import Steps, finished
 
 NOTICEABLE: Meters = 0.01
@@ -318,7 +316,7 @@ class Torso(ClearOfTable):
             self.attention.follow_run(run, now)
 
     def abandon(self, run: Run) -> None:
-        if choreography.is_shift(run.behavior):
+        if is_shift(run.behavior):
             self._stay(run)
             self.attention.expect("", 0.0, self.clock.time())
         else:
@@ -352,9 +350,9 @@ class Torso(ClearOfTable):
             self._wait_for_reach()
             finished(self.give_way())
 
-    def stop(self, run: Run) -> None:
-        super().stop(run)
+    def stop(self, run: Run) -> Seconds:
         self.attention.expect("", 0.0, self.clock.time())
+        return super().stop(run)
 
     # -- targets that move ----------------------------------------------------------------------------------------
 
@@ -386,7 +384,7 @@ class Torso(ClearOfTable):
             return
         run.is_lost = False
         path: Path | None = None
-        if run.holding or run.awaits("stroke") or choreography.is_shift(run.behavior):
+        if run.holding or run.awaits("stroke") or is_shift(run.behavior):
             path, aim = head.retargeted(run, course, track, now), course.aim
             run.course = course if path is not None else run.course
         elif not run.awaits("relax"):

@@ -23,10 +23,11 @@ from engage_hri.services.control.contract.variability import Deviations
 from engage_hri.services.control.figure import choreography, tracks
 from engage_hri.services.control.figure.course import Course
 from engage_hri.services.control.figure.estimates import beneath_a_look
+from engage_hri.services.control.figure.runs import Run
+from engage_hri.services.control.figure.torso import Torso, is_last_on_target
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import Path, resting
-from engage_hri.services.control.torso.runs import Run
-from engage_hri.services.control.torso.torso import Torso, is_last_on_target
+from engage_hri.services.control.motion.points import is_shift
 from engage_hri.services.runtime.steps import Steps
 
 RELEASE, BEGIN = 0, 1
@@ -356,7 +357,7 @@ def _begin(
 ) -> Steps[_Part | Estimate]:
     """Begin a behavior on the copy. Returns its estimate alone if it moves nothing."""
     behavior = item.behavior
-    if choreography.is_shift(behavior) and torso.is_overlaid():
+    if is_shift(behavior) and torso.is_overlaid():
         estimate = torso.estimate(behavior, None, torso.world)
         if estimate.feasible:
             course = choreography.plan(behavior, torso.situation(torso.world))

@@ -11,12 +11,11 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import choreography, tracks
 from engage_hri.services.control.figure.aiming import NECK, Aim
-from engage_hri.services.control.figure.course import Course, Situation
-from engage_hri.services.control.figure.pace import turning_time
+from engage_hri.services.control.figure.course import Course, Situation, turning_time
+from engage_hri.services.control.figure.runs import Run
+from engage_hri.services.control.figure.table_clearance import SHORTEST
 from engage_hri.services.control.figure.tracks import PartTrack
 from engage_hri.services.control.motion.path import Leg, Path
-from engage_hri.services.control.torso.runs import Run
-from engage_hri.services.control.torso.table_clearance import SHORTEST
 
 NOTICEABLE = radians(0.5)
 """Radians: a target that moves less does not move the head."""
