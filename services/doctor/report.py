@@ -8,9 +8,8 @@ from rich.table import Table
 from rich.text import Text
 
 from engage_hri.schemas.units import A_DAY, Seconds, span
-from engage_hri.services.doctor.facts import EndpointFacts, SystemFacts
+from engage_hri.services.doctor.facts import HERE, Cell, EndpointFacts, SystemFacts, matrix
 from engage_hri.services.doctor.findings import Diagnosis, Severity, certificates
-from engage_hri.services.doctor.matrix import HERE, Cell, matrix
 
 STYLES: dict[Severity, str] = {"wrong": "bold red", "doubtful": "yellow", "note": "dim"}
 WIDE = 100

@@ -14,14 +14,15 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.status import ClockOffset
 from engage_hri.services.doctor.facts import (
+    HERE,
     BodyFacts,
     Certificate,
     EndpointFacts,
     ParticipantFacts,
     SystemFacts,
+    matrix,
 )
 from engage_hri.services.doctor.findings import Diagnosis, findings
-from engage_hri.services.doctor.matrix import HERE, matrix
 from engage_hri.services.doctor.report import as_json, report
 from tests.cli.command import Engage, start
 from tests.cli.doctor_facts import AT, NAMES, known, listening, well, with_one

@@ -13,25 +13,33 @@ from rich.console import Console
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import Block, BlockOutcome
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply, RunFailed
+from engage_hri.schemas.feedback import WarningFeedback, WarningKind
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.references import sites
 from engage_hri.schemas.status import AskStatus
+from engage_hri.schemas.syncref import SyncRef
 from engage_hri.schemas.units import A_DAY, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Hub
 from engage_hri.services.client.language_models import summary_of
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline.embedding import in_memory, services
-from engage_hri.services.commandline.shell.exit_codes import readable
 from engage_hri.services.commandline.shell.failing_output import complain
-from engage_hri.services.commandline.shell.options import Connected, Embodied, Strict, VirtualTime, WorldFile, Written
+from engage_hri.services.commandline.shell.options import (
+    Connected,
+    Embodied,
+    Strict,
+    VirtualTime,
+    WorldFile,
+    Written,
+    strict_refusal,
+)
 from engage_hri.services.commandline.shell.outputs import Outputs, Terminal
-from engage_hri.services.commandline.shell.process import DONE, FAILED, REFUSED, run, unique_name
+from engage_hri.services.commandline.shell.process import DONE, FAILED, REFUSED, readable, run, unique_name
 from engage_hri.services.commandline.shell.settings import RobotConfig
-from engage_hri.services.commandline.shell.sources import InputFile, Thing, read_world, still
-from engage_hri.services.commandline.talk import input_check
-from engage_hri.services.commandline.talk.play_state import Played
-from engage_hri.services.commandline.talk.prose import Prose, Warnings, strict_refusal
+from engage_hri.services.commandline.shell.sources import InputFile, Thing, read_source, read_world, still
+from engage_hri.services.commandline.talk.played import Played, Prose, Warnings
 from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.console.terminal.live import Log
 from engage_hri.services.console.terminal.log import Telling
@@ -119,8 +127,8 @@ def main(options: Options) -> int:
     times = submission_times(options.at, len(options.files))
     with Outputs(options.events, options.feedback, options.outcomes) as outputs:
         world = read_world(options.world)
-        sources = input_check.read_all(options.files, outputs)
-        input_check.check(sources, world if options.embedded else None, config.robot, outputs)
+        sources = read_all(options.files, outputs)
+        check(sources, world if options.embedded else None, config.robot, outputs)
         played = Played(thing for source in sources for thing in source.things)
         outputs.wanted = played.concerns
         console = outputs.console(quiet=options.quiet)
@@ -174,7 +182,7 @@ async def _remote(job: Job, config: RobotConfig) -> int:
             world = await world_with_people(robot, job.things, config.robot, WORLD_PATIENCE)
         if job.has_fragments:
             # Without perception generation itself waits or refuses.
-            input_check.check(job.sources, world, config.robot, job.outputs)
+            check(job.sources, world, config.robot, job.outputs)
         return await _perform_all(job, hub, PATIENCE)
 
 
@@ -201,7 +209,7 @@ async def world_with_people(robot: Robot, things: Sequence[Thing], name: str, pa
     """
     deadline, world = robot.now() + patience, None
     with robot.worlds() as worlds:
-        while any(input_check.lacks_people(thing, world or NOTHING, name) for thing in things):
+        while any(lacks_people(thing, world or NOTHING, name) for thing in things):
             newer = await worlds.next(max(0.0, deadline - robot.now()))
             if newer is None:
                 break
@@ -286,3 +294,62 @@ async def _submit(thing: Thing, robot: Robot, patience: Seconds | None) -> Fragm
     if isinstance(thing, Block):
         return await robot.realize(thing, timeout=patience)
     return await robot.perform(thing, timeout=patience)
+
+
+def read_all(files: Sequence[Path], outputs: Outputs) -> tuple[InputFile, ...]:
+    """Read all files. Raises InputRefused for the first bad one, after its warning has gone to the feedback."""
+    sources = []
+    for path in files:
+        try:
+            sources.append(read_source(path))
+        except InputRefused as error:
+            _warn(outputs, error.block, error.fault)
+            raise
+    return tuple(sources)
+
+
+def check(sources: Sequence[InputFile], world: World | None, robot: str, outputs: Outputs) -> None:
+    """Check blocks for contradictions, and fragments against a world, if it is known. Raises InputRefused."""
+    from engage_hri.services.generation.fragment_check import performable
+    from engage_hri.services.realizer.plan.known import Known
+    from engage_hri.services.realizer.plan.planner import plan_block
+    from engage_hri.services.realizer.plan.relations import BlockRefused
+
+    for source in sources:
+        for thing in source.things:
+            try:
+                with source.naming_file():
+                    if isinstance(thing, Block):
+                        # The realizer will check that the other blocks are alive when this one comes.
+                        plan_block(thing, known=Known(blocks=dict.fromkeys(_others(thing))))
+                    elif world is not None:
+                        performable(thing, world, robot)
+            except InputRefused as error:
+                refusal = error.__cause__
+                kind = refusal.kind if isinstance(refusal, BlockRefused) else "PARSING_FAILURE"
+                _warn(outputs, thing.id, error.fault, kind)
+                raise
+
+
+def lacks_people(thing: Thing, world: World, robot: str) -> bool:
+    """True if a fragment or block speaks to somebody, or has a target that is not known, and the world has no people.
+
+    robot: its actor id, which may be a target.
+    """
+    from engage_hri.services.generation import fragment_check
+
+    if world.people:
+        return False
+    known = {robot, "", *(entity.id for entity in world.entities)}
+    if any(getattr(behavior, "target", "") not in known for behavior in thing.behaviors):
+        return True
+    return isinstance(thing, TurnFragment) and fragment_check.lacks_people(thing, world)
+
+
+def _others(block: Block) -> set[str]:
+    """Ids of the other blocks to whose points a block refers."""
+    return {SyncRef.parse(site.text).block for site in sites(block)} - {"", block.id}
+
+
+def _warn(outputs: Outputs, block: str | None, fault: Fault, kind: WarningKind = "PARSING_FAILURE") -> None:
+    outputs(WarningFeedback(block=block, kind=kind, message=readable(fault)), 0.0)
