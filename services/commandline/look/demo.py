@@ -60,7 +60,7 @@ def main(options: Options) -> int:
         live = console.is_terminal and not options.virtual_time and not options.quiet
         window = can_open(live) if options.window is None and not options.you else options.window is not False
         result = run(demonstrate(config, outputs, console, live, options, window), virtual_time=options.virtual_time)
-        console.print(tally.render(result, config.robot, console.width))
+        console.print(tally.render(result, config.robot))
     return DONE
 
 
