@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from msgspec.structs import asdict
 
 from engage_hri.schemas.behaviors import Event, Speech
-from engage_hri.schemas.nets import Fired, NetPlace, NetPlanned, NetPoint, NetSpeech, NetTransition
+from engage_hri.schemas.blocks import Fired, NetPlace, NetPlanned, NetPoint, NetSpeech, NetTransition
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.realizer.net import pnml
 from engage_hri.services.realizer.net.petri_net import Marking, PetriNet, is_live, is_safe

@@ -20,12 +20,12 @@ from msgspec.structs import replace
 from rich.console import Console
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.advice import explained
+from engage_hri.schemas.blocks import PredictionFeedback, SyncPointProgress
 from engage_hri.schemas.body import PerformBehavior
-from engage_hri.schemas.explained import explained
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.feedback import PredictionFeedback, SyncPointProgress
-from engage_hri.schemas.ledger import Step, Taken
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.participants import Step, Taken
 from engage_hri.schemas.recognition import ConnectionEvent, session_of
 from engage_hri.schemas.requests import KeepAlive
 from engage_hri.schemas.units import Seconds

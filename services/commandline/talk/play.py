@@ -9,14 +9,12 @@ from typing import Annotated, Literal
 import typer
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.blocks import Block, BlockOutcome
+from engage_hri.schemas.blocks import Block, BlockOutcome, WarningFeedback, WarningKind
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply, RunFailed
-from engage_hri.schemas.feedback import WarningFeedback, WarningKind
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.references import sites
-from engage_hri.schemas.status import AskStatus
-from engage_hri.schemas.syncref import SyncRef
+from engage_hri.schemas.participants import AskStatus
+from engage_hri.schemas.references import SyncRef, sites
 from engage_hri.schemas.units import A_DAY, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Hub

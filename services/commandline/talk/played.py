@@ -12,15 +12,21 @@ from msgspec.structs import replace
 from rich.console import Console
 
 from engage_hri.schemas.behaviors import Event
-from engage_hri.schemas.blocks import Block, BlockOutcome
-from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.blocks import (
+    Block,
+    BlockOutcome,
+    BlockProgress,
+    PredictionFeedback,
+    SyncPointProgress,
+    WarningFeedback,
+)
 from engage_hri.schemas.fragments import FragmentOutcome, HeardText, TurnFragment
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent
 from engage_hri.schemas.summary import summary
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.client.hearing import NewWords
+from engage_hri.services.client.robot import NewWords
 from engage_hri.services.commandline.shell.outputs import Outputs
 from engage_hri.services.commandline.shell.process import DONE, FAILED
 from engage_hri.services.commandline.shell.sources import Thing

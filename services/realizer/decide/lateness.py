@@ -16,8 +16,7 @@ from msgspec import Struct
 from engage_hri.schemas.behavior_types import canonical_sync
 from engage_hri.schemas.behaviors import Event, Speech
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.references import type_name
-from engage_hri.schemas.syncref import SyncRef
+from engage_hri.schemas.references import SyncRef, type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.sight import Sight
 from engage_hri.services.realizer.config import LATE, RealizerConfig

@@ -13,9 +13,9 @@ from typing import NamedTuple, TypeVar
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Event, TurnSignal, Wait
+from engage_hri.schemas.blocks import WarningKind
 from engage_hri.schemas.body import BehaviorOutcome, SyncPointArrived, SyncPointReached
 from engage_hri.schemas.faults import EngageError, Fault
-from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.decide.decisions import Begin, Decisions, Extend

@@ -14,7 +14,7 @@ from engage_hri.schemas.behaviors import BlockBehavior, Event, TurnSignal
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import GoHome, PerformBehavior, PlannedInstant
 from engage_hri.schemas.faults import EngageError, Fault
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus

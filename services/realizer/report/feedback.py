@@ -6,12 +6,12 @@ from typing import Literal, NamedTuple
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behavior_types import dialect_sync
-from engage_hri.schemas.blocks import SpokenText
-from engage_hri.schemas.feedback import (
+from engage_hri.schemas.blocks import (
     BlockProgress,
     Feedback,
     PlannedPoint,
     PredictionFeedback,
+    SpokenText,
     SyncPointProgress,
     WarningFeedback,
     WarningKind,

@@ -11,7 +11,7 @@ from engage_hri.schemas.behaviors import BlockBehavior, Speech
 from engage_hri.schemas.blocks import Block, BlockOutcome, SpokenText
 from engage_hri.schemas.body import BehaviorOutcome
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.speakable import has_words
+from engage_hri.schemas.text import has_words
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import DROPPED
 from engage_hri.services.realizer.points import Point, as_told
