@@ -194,6 +194,8 @@ async def _show(works: Callable[[], Awaitable[None]], sign: Callable[[], None]) 
         await asyncio.sleep(EVERY)
 
 
+# -- the watch over it -----------------------------------------------------------------------------------------
+
 SIGN = "\x06"
 """Line that is a sign of life, and not passed on."""
 EVERY: Seconds = 1.0
