@@ -2,7 +2,7 @@
 
 SHELLS = {
     "services/realizer/perform/performance.py",  # awaits bodies
-    "services/realizer/perform/links.py",  # asks the body and recognition
+    "services/realizer/perform/recognition_link.py",  # asks recognition
     "services/control/serving/state_publisher.py",  # publishes what the body shows
     "services/control/serving/questions.py",  # answers what behaviors would take
     "services/control/serving/estimates.py",  # publishes mistakes of the body

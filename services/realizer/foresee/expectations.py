@@ -126,7 +126,7 @@ class Expectations(Observer):
     def none_before(self, now: Seconds) -> None:
         """Expect nothing that has not happened before now: what was held has not come in the meantime."""
         if (forecast := self.forecast) is not None:
-            coming = [each for each in range(len(self.plan.members)) if each not in self._net.instants]
+            coming = [each for each in range(len(self.plan.members)) if each not in self._net.fired]
             self._news += [(forecast.overdue, each, now) for each in coming]
 
     def go_on(self, behavior: str, now: Seconds) -> None:
@@ -469,7 +469,7 @@ class Foresight(Expectations):
         if (forecast := self.forecast) is not None:
             self.catch_up()
         else:
-            known = (self.foreseen, facts.reached, facts.arrived, self._net.instants)
+            known = (self.foreseen, facts.reached, facts.arrived, self._net.fired)
             heard = self.utterances.since
             forecast = full_forecast(self.plan, facts.began, self.experience.factor, *known, self._prolonged, heard)
         return forecast.as_of(now, self._stood(now))

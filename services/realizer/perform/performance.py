@@ -23,18 +23,15 @@ from engage_hri.services.realizer.decide.decisions import Begin, Decisions, Effe
 from engage_hri.services.realizer.decide.lateness import Late, Stalled
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.perform.behavior_run import (
-    BehaviorLost,
     BehaviorRun,
-    BodyLost,
-    PointHeld,
+    ControlLink,
     PointPassed,
-    RunNews,
     Stage,
     SyncPointFutures,
     all_ended,
 )
-from engage_hri.services.realizer.perform.links import ControlLink, Presence, RecognitionLink
 from engage_hri.services.realizer.perform.net_stream import NetStream
+from engage_hri.services.realizer.perform.recognition_link import Presence, RecognitionLink
 from engage_hri.services.realizer.plan.known import Known, is_named_in
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import planned_again, reestimated
@@ -114,8 +111,9 @@ class BlockPerformance(Neighbor):
             shared.bus, shared.requests, shared.peers, lambda: (each.last_deed for each in shared.others())
         )
         stage = Stage(
-            live.id, plan, self.decisions, self.bus, self.body, recognition, self.futures, self.spoken, self._take
-        )
+            live.id, plan, self.decisions, self.bus, self.body, recognition, self.futures, self.spoken,
+            self._arrive, self._reach, self.lose, self._lose_body,
+        )  # fmt: skip
         self._runs = {id: BehaviorRun(stage, id) for id in plan.chains}
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._dropped = reasons(plan)
@@ -433,6 +431,7 @@ class BlockPerformance(Neighbor):
         """Tell what was reached, in feedback and to other blocks."""
         while self._untold:  # one by one: others may have it planned again when they hear, and that tells the rest
             point, at, arrived, by_body = self._untold.pop(0)
+            self.spoken.reach(point)
             came = self.decisions.facts.arrived.get(point, arrived)
             self.report.reached(self.decisions, point, arrived=came, by_body=by_body)
             self._shared.live_blocks.reach(self.plan.block.id, point, at)
@@ -445,25 +444,16 @@ class BlockPerformance(Neighbor):
 
     # -- what behaviors tell -----------------------------------------------------------------------------------------
 
-    def _take(self, news: RunNews) -> None:
-        match news:
-            case PointHeld(point, at):
-                if not self._ending.done():
-                    self.decisions.arrive(point, at)
-                    self._hurry()
-            case PointPassed():
-                self._reach(news)
-            case BehaviorLost(behavior, fault, kind, at_rest):
-                self.lose(behavior, fault, kind, at_rest=at_rest)
-            case BodyLost(fault):
-                self._lose_body(fault)
+    def _arrive(self, point: Point, at: Seconds) -> None:
+        if not self._ending.done():
+            self.decisions.arrive(point, at)
+            self._hurry()
 
     def _reach(self, told: PointPassed) -> None:
         point, at = told.point, told.at
         if news := self.decisions.reach(point, at):
             self._untold += [News(each, at, told.arrived if each == point else None, told.by_body) for each in news]
             for each in news:
-                self.spoken.reach(each)
                 self.futures.reach(each, at)
             self._hurry()
 
@@ -474,7 +464,7 @@ class BlockPerformance(Neighbor):
                 self.apply(effect)
         self._afterwards.set()
 
-    def lose(self, id: str, fault: Fault, kind: WarningKind = "EXECUTION_FAILURE", *, at_rest: bool = False) -> None:
+    def lose(self, id: str, fault: Fault, kind: WarningKind = "EXECUTION_FAILURE", at_rest: bool = False) -> None:
         """Drop a behavior that cannot be finished; if it is required, the block fails. at_rest: its parts rest."""
         if id in self._dropped or self._ending.done():
             return

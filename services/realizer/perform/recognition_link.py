@@ -1,26 +1,25 @@
-"""Requests of one block to others: behaviors to the body, connection events and turn signals to recognition.
+"""Requests of one block to recognition: connection events and turn signals.
 
 Recognition may not be there, or die. Then the clock decides its events, so who is on the bus is followed here.
 """
 
 import asyncio
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import BlockBehavior, Event, TurnSignal
+from engage_hri.schemas.behavior_types import canonical_sync
+from engage_hri.schemas.behaviors import Event, Speech, TurnSignal
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.body import GoHome, PerformBehavior, PlannedInstant
-from engage_hri.schemas.faults import EngageError, Fault
+from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.presence import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn
+from engage_hri.schemas.references import type_name
+from engage_hri.schemas.syncref import SyncRef
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.decide.decisions import Begin, Extend
-from engage_hri.services.realizer.decide.lateness import event_deadline
 from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.points import EPSILON, Point
 from engage_hri.services.requests.deadlines import Silences
@@ -31,72 +30,48 @@ class Presence:
     """Services that are, or were, on the bus; not managers: ever new ones come. changed: at the next change."""
 
     def __init__(self) -> None:
-        self._there: set[str] = set()
-        self._left: set[str] = set()
+        self._is_there: dict[str, bool] = {}
         self._loop = asyncio.get_running_loop()
         self.changed: asyncio.Future[None] = self._loop.create_future()
 
     def feed(self, message: PeerAlive | PeerGone) -> None:
-        if message.participant not in keys.SERVICES:
-            return
-        now, before = (self._there, self._left) if isinstance(message, PeerAlive) else (self._left, self._there)
-        now.add(message.participant)
-        before.discard(message.participant)
-        self.changed.set_result(None)
-        self.changed = self._loop.create_future()
+        if message.participant in keys.SERVICES:
+            self._is_there[message.participant] = isinstance(message, PeerAlive)
+            self.changed.set_result(None)
+            self.changed = self._loop.create_future()
 
     def has_left(self, participant: str) -> bool:
         """True if the participant was there and is not now."""
-        return participant in self._left
+        return not self._is_there.get(participant, True)
 
     def __contains__(self, participant: str) -> bool:
-        return participant in self._there
+        return self._is_there.get(participant, False)
 
 
-LONGEST_WAY: Seconds = 10.0
-"""Most seconds on the way home; a body that does not say that it is there is not asked for longer."""
+UNTOLD: Seconds = 2.5
+"""Limit of an event where neither the block nor recognition names one, because recognition is not there. Nobody can
+say then what the person does: the robot leaves the time in which most people follow a point or begin to answer."""
+GRACE: Seconds = 0.5
+"""Time after its limit at which an event ends as failed if recognition is not there to decide it."""
 
 
-class ControlLink:
-    """Sends the body what one block asks of it.
+def event_deadline(event: Event, block: Block, reached: Mapping[Point, Seconds]) -> Seconds:
+    """Time at which an event has failed, if recognition is not there to decide it.
 
-    request: the id of the block's request; that of a behavior is `<request>/<behavior>`, with `%2F` for a slash in
-    the behavior's, so that no two are alike. Ids of behaviors hold no colon.
+    The limit counts from the start or from the last of the anchors that are reached by now.
     """
+    anchors = (reached.get(_point(text, block)) for text in event.anchors)
+    since = max(time for time in (reached[Point(event.id, "start")], *anchors) if time is not None)
+    return since + (event.limit or UNTOLD) + GRACE
 
-    def __init__(self, bus: Bus, requests: Requester, request: str, block: str, config: RealizerConfig) -> None:
-        self._bus = bus
-        self._requests = requests
-        self._request = request
-        self._block = block
-        self._held_after = config.held_after
 
-    def id(self, behavior: str) -> str:
-        """Id of the request for a behavior, to whatever service performs it."""
-        quoted = behavior.replace("%", "%25").replace("/", "%2F")
-        return f"{self._request}/{quoted}"
-
-    def perform(self, behavior: BlockBehavior, asked: Begin | Extend) -> Pending:
-        """Ask the body to begin a behavior, or to go on as far as is asked."""
-        perform = PerformBehavior(
-            id=self.id(behavior.id),
-            block=self._block,
-            behavior=behavior,
-            through=asked.through.partition(":")[0],  # without the number of a repeated stroke
-            pace=tuple(PlannedInstant(sync=sync, at=self._bus.stamp(at)) for sync, at in asked.pace),
-            held=isinstance(asked, Extend) and asked.held,
-            held_after=self._held_after,
-        )
-        return self._requests.send(keys.BEHAVIOR, perform)
-
-    def cancel(self, behavior: str, why: Fault | str) -> None:
-        """Cancel the request for a behavior, to whatever service performs it. why: what has happened."""
-        self._requests.cancel(self.id(behavior), why)
-
-    def go_home(self, parts: Iterable[str], behavior: str = "") -> None:
-        """Send these parts home. behavior: the one that used them; empty: the whole block."""
-        going = GoHome(id=f"{self.id(behavior)}:home", parts=tuple(sorted(parts)))
-        self._requests.send(keys.BEHAVIOR, going, within=LONGEST_WAY)
+def _point(text: str, block: Block) -> Point:
+    ref = SyncRef.parse(text)
+    behavior = next((each for each in block.behaviors if each.id == ref.behavior), None)
+    if isinstance(behavior, Speech):
+        ref = SyncRef.parse(text, [mark.id for mark in behavior.marks])
+    sync = canonical_sync(ref.sync, type_name(behavior) if behavior else "", block.dialect)
+    return Point(ref.behavior, sync)
 
 
 UNPROMISED: Seconds = 30.0
