@@ -8,10 +8,9 @@ SHELLS = {
     "services/control/serving/estimates.py",  # publishes mistakes of the body
     "services/control/serving/warnings_told.py",  # publishes what a person has to see to
     "services/control/bases/driver_guard.py",  # times the calls of drivers by the clock of the loop
-    "services/realizer/report/feedback.py",  # publishes feedback
+    "services/realizer/report.py",  # publishes feedback
     "services/realizer/perform/behavior_run.py",  # awaits and resolves sync points, awaits ends
-    "services/realizer/together/planning.py",  # asks the body
-    "services/realizer/together/rehearsal.py",  # asks it again
+    "services/realizer/together/planning.py",  # asks the body, and asks it again
     "services/realizer/perform/net_stream.py",  # publishes the marking
     "services/realizer/perform/steering.py",  # holds, continues and stops
     "services/realizer/together/live.py",  # resolved when a block has ended

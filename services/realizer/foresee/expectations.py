@@ -1,8 +1,8 @@
 """Expectations of a running block as its news come: what was measured, said, held, and what other blocks expect.
 
 They say "not before"; who is released by a measured event need not ask them. So they may fall behind: what they are
-told waits until `update`. What is asked of them is in `Foresight`: when each point is expected, and at what pace the
-behaviors are to move for that.
+told waits until `update`. Asked of them is when each point is expected, and at what pace the behaviors are to move
+for that.
 """
 
 import heapq
@@ -45,7 +45,7 @@ Pace = tuple[tuple[str, Seconds], ...]
 """Sync points and their instants, by loop time, where the behavior's natural pace would miss them; else empty."""
 
 
-class Expectations(Observer):
+class Foresight(Observer):
     """Expectations of a block.
 
     paces: the pace that each behavior was last told. paced: those that ever hurried or dawdled: a gesture that was
@@ -352,9 +352,7 @@ class Expectations(Observer):
         before, here = (self.plan.at[point] for point in chain.points[number - 1 : number + 1])
         return 0.0 if before == here else self.forecast.phase(behavior, here)
 
-
-class Foresight(Expectations):
-    """Answers from what is expected of a block."""
+    # -- questions -----------------------------------------------------------------------------------------------
 
     def due(self, transition: int, ripe: Seconds) -> Seconds:
         """Time at which an instant is due, no earlier than all that it waits for is `ripe`."""

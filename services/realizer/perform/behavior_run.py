@@ -37,7 +37,7 @@ from engage_hri.services.realizer.plan.phases import with_planned_hand
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.words import AS_IN_DRAFTS, Spelling
 from engage_hri.services.realizer.points import EPSILON, FINISH, Point, performer
-from engage_hri.services.realizer.report.outcome import Spoken
+from engage_hri.services.realizer.report import Spoken
 from engage_hri.services.realizer.together.live import Ending
 from engage_hri.services.requests.ends import NeverEnded, Pending, Requester, RequestRefused, unfinished
 

@@ -38,11 +38,10 @@ from engage_hri.services.realizer.plan.planner import planned_again, reestimated
 from engage_hri.services.realizer.plan.remaining import events_needing, without
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import FINISH, Point, frozen
-from engage_hri.services.realizer.report.feedback import News, Reporter
-from engage_hri.services.realizer.report.outcome import Spoken, completed, reasons
+from engage_hri.services.realizer.report import News, Reporter, Spoken, completed, reasons
 from engage_hri.services.realizer.together.live import Ending, Live
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks, Neighbor
-from engage_hri.services.realizer.together.rehearsal import Ask, Rehearsing, is_crowd, parts_moved
+from engage_hri.services.realizer.together.planning import Ask, Rehearsing, is_crowd, parts_moved
 from engage_hri.services.realizer.together.ties import Ties
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.alarm import Afterwards, Alarm, Timer

@@ -16,7 +16,7 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.performance import BlockPerformance
 from engage_hri.services.realizer.points import EPSILON, frozen
-from engage_hri.services.realizer.report.feedback import ON_REQUEST
+from engage_hri.services.realizer.report import ON_REQUEST
 from engage_hri.services.realizer.together.live import Ending, Live, absence
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks
 from engage_hri.services.requests.ends import RequestDesk
