@@ -68,7 +68,7 @@ LAYERS = {
     "services/generation": "service > intake > fragments > performance > body_link choosing_again ways > exchange"
     " fragment_check > acts lost pipeline > block head names > references turns > permits > config",
     "services/realizer": "service > perform > export together > report > decide > foresee > plan > net"
-    " > config inputs points",
+    " > config points",
     "services/recognition": "service > intake > recognizer > perceive statistics > events > config",
 }
 """What lies above what within a folder: its files and folders by name, `*` for all others. Each may import what

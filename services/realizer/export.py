@@ -1,8 +1,7 @@
 """A plan for people and programs: text, JSON, a drawing of its net (DOT), and the net for other tools (PNML).
 
 P/T nets have no words for seconds, sync points, XML lines and bounds. In PNML these stand in `toolspecific` elements
-of ours, which other tools pass over. Watchers of a running block are told the same net in messages (`described`,
-`tokens`).
+of ours, which other tools pass over. Watchers of a running block are told the same net in messages (`described`).
 """
 
 import json
@@ -43,7 +42,7 @@ def described(
         at=began,
         transitions=tuple(transitions),
         places=tuple(places),
-        marked=tokens(marking),
+        marked=tuple(number for number, content in enumerate(marking) if content),
         fired=firings(fired),
         speeches=tuple(
             NetSpeech(behavior=as_told(each.id), text=each.text)
@@ -55,11 +54,6 @@ def described(
 
 def _point(point: Point, spelling: Spelling) -> NetPoint:
     return NetPoint(behavior=as_told(point.behavior), sync=spelling.sync(point))
-
-
-def tokens(marking: Marking) -> tuple[int, ...]:
-    """Numbers of the places that hold a token."""
-    return tuple(number for number, content in enumerate(marking) if content)
 
 
 def firings(fired: Mapping[int, Seconds]) -> tuple[Fired, ...]:

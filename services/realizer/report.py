@@ -124,14 +124,6 @@ class Reporter:
         for problem in plan.problems:
             self.warn(problem.kind, problem.message, problem.behavior)
 
-    def now(self) -> Seconds:
-        """Present loop time."""
-        return self._bus.now()
-
-    def may_expect(self) -> bool:
-        """True if it is time to predict again."""
-        return self._bus.now() >= self.not_before
-
     def expect(self, plan: Plan, began: Seconds, times: Mapping[Point, Seconds]) -> None:
         """Tell when the points still to come are expected, seconds from the block's start, if that is news."""
         ours = {point: times[point] for point in _points(plan) if point in times}

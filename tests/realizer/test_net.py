@@ -18,8 +18,6 @@ from engage_hri.services.realizer.net.petri_net import (
     PetriNet,
     Place,
     Transition,
-    enabled,
-    fire,
     fire_once_each,
     is_live,
     is_safe,
@@ -28,6 +26,7 @@ from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody
+from tests.realizer.firing import enabled, fire
 from tests.realizer.oracle import estimated, random_blocks
 from tests.realizer.pnml_reader import read_pnml
 from tests.realizer.stage import after, before, block, together

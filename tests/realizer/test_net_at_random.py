@@ -15,8 +15,6 @@ from engage_hri.services.realizer.net.petri_net import (
     PetriNet,
     Place,
     Transition,
-    enabled,
-    fire,
     fire_once_each,
     is_live,
     is_safe,
@@ -24,6 +22,7 @@ from engage_hri.services.realizer.net.petri_net import (
 )
 from engage_hri.services.realizer.points import Point
 from tests.random_cases import share_of
+from tests.realizer.firing import enabled, fire
 from tests.realizer.planning import at, plan, timed
 from tests.realizer.pnml_reader import read_pnml
 from tests.realizer.stage import after, before, block, together

@@ -244,11 +244,6 @@ class Decisions:
         """True if the behaviors of the block are being ended, whatever was planned."""
         return self._is_ending()
 
-    @property
-    def is_over(self) -> bool:
-        """True if everything has happened that the end of the block waits for."""
-        return self.net.is_over
-
     def broken(self, point: Point) -> list[Broken]:
         """Constraints that are broken, now that a point was reached: one of this block, or of another.
 

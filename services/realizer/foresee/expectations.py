@@ -13,6 +13,7 @@ from typing import Any
 
 from msgspec import Struct
 
+from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.foresee.forecast import Forecast, full_forecast, is_predictive
 from engage_hri.services.realizer.foresee.pace import SHORT, Experience, Interval, Utterances
@@ -20,7 +21,7 @@ from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START
 from engage_hri.services.realizer.plan.plan import BRAKING, Plan, slack
-from engage_hri.services.realizer.points import EPSILON, ORIGIN, SHIFTS, Member, Point, frozen, performer, stands_soon
+from engage_hri.services.realizer.points import EPSILON, ORIGIN, SHIFTS, Member, Point, frozen, stands_soon
 
 
 class Outlook(Struct, frozen=True):
@@ -223,8 +224,9 @@ class Foresight(Observer):
         before, natural = chain.points[number - 1], chain.segments[number - 1].natural
         if self.utterances.follows(point.behavior):
             self._learn_words(point.behavior, self.utterances.interval(point.behavior, to_point=True), at)
-        elif natural >= SHORT and performer(chain.behavior) == "body":
-            if self.plan.predicted(point) - self.plan.predicted(before) < natural - EPSILON:
+        elif natural >= SHORT and TYPES[chain.type].performer == "body":
+            schedule, at_instant = self.plan.schedule, self.plan.at
+            if schedule[at_instant[point]] - schedule[at_instant[before]] < natural - EPSILON:
                 return  # it was to be cut short
             since = self._facts.reached[before]
             is_beneath = chain.type in SHIFTS and at - since < natural  # perhaps: a look has begun over it

@@ -192,17 +192,10 @@ class RunningNet:
     def observe(self, observers: Iterable[Observer]) -> None:
         """Tell these, too, what happens from now on."""
         for each in observers:
-            kind = type(each)
-            if kind.on_began is not Observer.on_began:
-                self._told.began.append(each.on_began)
-            if kind.on_arrived is not Observer.on_arrived:
-                self._told.arrived.append(each.on_arrived)
-            if kind.on_reached is not Observer.on_reached:
-                self._told.reached.append(each.on_reached)
-            if kind.on_opened is not Observer.on_opened:
-                self._told.opened.append(each.on_opened)
-            if kind.on_fired is not Observer.on_fired:
-                self._told.fired.append(each.on_fired)
+            for event, told in self._told._asdict().items():
+                name = f"on_{event}"
+                if getattr(type(each), name) is not getattr(Observer, name):
+                    told.append(getattr(each, name))
 
     def _mark_before_end(self) -> int:
         """Mark the transitions that the end of the block waits for; returns how many these are.

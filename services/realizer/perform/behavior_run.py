@@ -16,6 +16,7 @@ from typing import NamedTuple, TypeVar
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.behaviors import BlockBehavior, Event, TurnSignal, Wait
 from engage_hri.schemas.body import (
     BehaviorOutcome,
@@ -29,14 +30,13 @@ from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Begin, Decisions, Extend
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
 from engage_hri.services.realizer.plan.phases import with_planned_hand
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.words import AS_IN_DRAFTS, Spelling
-from engage_hri.services.realizer.points import EPSILON, FINISH, Point, performer
+from engage_hri.services.realizer.points import EPSILON, FINISH, Point
 from engage_hri.services.realizer.report import Spoken
 from engage_hri.services.realizer.together.live import Ending
 from engage_hri.services.requests.ends import NeverEnded, Pending, Requester, RequestRefused, unfinished
@@ -145,46 +145,45 @@ LONGEST_WAY: Seconds = 10.0
 """Most seconds on the way home; a body that does not say that it is there is not asked for longer."""
 
 
-class ControlLink:
+class ControlLink(NamedTuple):
     """Sends the body what one block asks of it.
 
     request: the id of the block's request; that of a behavior is `<request>/<behavior>`, with `%2F` for a slash in
-    the behavior's, so that no two are alike. Ids of behaviors hold no colon.
+    the behavior's, so that no two are alike. Ids of behaviors hold no colon. held_after: see `RealizerConfig`.
     """
 
-    def __init__(self, bus: Bus, requests: Requester, request: str, block: str, config: RealizerConfig) -> None:
-        self._bus = bus
-        self._requests = requests
-        self._request = request
-        self._block = block
-        self._held_after = config.held_after
+    bus: Bus
+    requests: Requester
+    request: str
+    block: str
+    held_after: Seconds
 
     def id(self, behavior: str) -> str:
         """Id of the request for a behavior, to whatever service performs it."""
         quoted = behavior.replace("%", "%25").replace("/", "%2F")
-        return f"{self._request}/{quoted}"
+        return f"{self.request}/{quoted}"
 
     def perform(self, behavior: BlockBehavior, asked: Begin | Extend) -> Pending:
         """Ask the body to begin a behavior, or to go on as far as is asked."""
         perform = PerformBehavior(
             id=self.id(behavior.id),
-            block=self._block,
+            block=self.block,
             behavior=behavior,
             through=asked.through.partition(":")[0],  # without the number of a repeated stroke
-            pace=tuple(PlannedInstant(sync=sync, at=self._bus.stamp(at)) for sync, at in asked.pace),
+            pace=tuple(PlannedInstant(sync=sync, at=self.bus.stamp(at)) for sync, at in asked.pace),
             held=isinstance(asked, Extend) and asked.held,
-            held_after=self._held_after,
+            held_after=self.held_after,
         )
-        return self._requests.send(keys.BEHAVIOR, perform)
+        return self.requests.send(keys.BEHAVIOR, perform)
 
     def cancel(self, behavior: str, why: Fault | str) -> None:
         """Cancel the request for a behavior, to whatever service performs it. why: what has happened."""
-        self._requests.cancel(self.id(behavior), why)
+        self.requests.cancel(self.id(behavior), why)
 
     def go_home(self, parts: Iterable[str], behavior: str = "") -> None:
         """Send these parts home. behavior: the one that used them; empty: the whole block."""
         going = GoHome(id=f"{self.id(behavior)}:home", parts=tuple(sorted(parts)))
-        self._requests.send(keys.BEHAVIOR, going, within=LONGEST_WAY)
+        self.requests.send(keys.BEHAVIOR, going, within=LONGEST_WAY)
 
 
 class Stage(NamedTuple):
@@ -216,20 +215,21 @@ class BehaviorRun:
     pending: the request to what performs it.
     """
 
-    __slots__ = ("_asked", "_block", "_hold_changed", "behavior", "id", "pending")
+    __slots__ = ("_asked", "_block", "_hold_changed", "_performer", "behavior", "id", "pending")
 
     def __init__(self, block: Stage, id: str) -> None:
         self.id = id
         self.behavior: BlockBehavior | None = None
         self.pending: Pending | None = None
         self._block = block
+        self._performer = TYPES[block.plan.chains[id].type].performer
         self._asked: Begin | Extend | None = None
         self._hold_changed: asyncio.Future[None] | None = None
 
     @property
     def is_by_body(self) -> bool:
         """True if the body performs it: it has begun."""
-        return self.behavior is not None and performer(self.behavior) == "body"
+        return self.behavior is not None and self._performer == "body"
 
     def command(self, asked: Begin | Extend) -> None:
         """Let it begin, or go on as far as is asked. The body hears of it at once."""
@@ -243,7 +243,7 @@ class BehaviorRun:
             self._hold_changed.set_result(None)
         elif self.is_by_body:
             self._send()
-        if asked.through == "end" and performer(block.plan.chains[self.id].behavior) == "clock":
+        if asked.through == "end" and self._performer == "clock":
             block.futures.grant(Point(self.id, "end"))
 
     def feed(self, message: SyncPointArrived | SyncPointReached) -> None:

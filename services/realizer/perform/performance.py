@@ -102,7 +102,7 @@ class BlockPerformance(Neighbor):
         self._net = NetStream(shared.bus, live.id, spelling, live.request.follows)
         self.report = Reporter(shared.bus, live.id, spelling)
         self.spoken = Spoken(plan.block.behaviors)
-        self.body = ControlLink(shared.bus, shared.requests, live.request.id, live.id, shared.config)
+        self.body = ControlLink(shared.bus, shared.requests, live.request.id, live.id, shared.config.held_after)
         self.decisions = Decisions(
             plan, self.bus.now(), shared.config, self._observers, self._is_free, self.bus.sight, self._ending.done
         )
@@ -129,7 +129,13 @@ class BlockPerformance(Neighbor):
         self._afterwards = Afterwards(self.take_in)
         self._soon = Alarm(self.take_in)
         self.rehearsing = Rehearsing(
-            self.decisions, shared.performed, self._known, self.bus.now, shared.ask, self._plan_with, self.containing
+            self.decisions,
+            shared.performed,
+            self._known,
+            self.bus.now,
+            shared.ask,
+            lambda estimates: self.take_in(partial(self._go_on_with_estimates, estimates)),
+            self.containing,
         )
         self._untold: list[News] = []
         self._needs_replan = False
@@ -305,10 +311,6 @@ class BlockPerformance(Neighbor):
 
     # -- holds -------------------------------------------------------------------------------------------------------
 
-    def can_wait(self, behavior: str) -> bool:
-        """True if the behavior, which is going on, can still be made to wait somewhere."""
-        return self.decisions.can_wait(behavior)
-
     def hold_up(self, is_held: bool) -> None:
         """Note that something is held from now on, perhaps of another block, or nothing any more."""
         if is_held != self._is_held:
@@ -393,7 +395,7 @@ class BlockPerformance(Neighbor):
             made_news = [self.apply(effect) for effect in self.decisions.advance(self.bus.now())]
             again = any(made_news)
         foresight = self.decisions.foresight
-        if foresight.is_surprised and self.report.may_expect() and not self._ending.done():
+        if foresight.is_surprised and self.bus.now() >= self.report.not_before and not self._ending.done():
             self.report.expect(self.decisions.plan, self.decisions.began, foresight.expected(self.bus.now()))
         self._shared.live_blocks.foresee(self.plan.block.id, foresight.ahead)
         self.tell_stuck()
@@ -508,9 +510,6 @@ class BlockPerformance(Neighbor):
             self._go_on_with(planned_again(self.decisions.plan, self._known(), self._gone))
         except InputRefused as error:
             self._live.fail(error.fault)
-
-    def _plan_with(self, estimates: Iterable[Estimate]) -> None:
-        self.take_in(partial(self._go_on_with_estimates, estimates))
 
     def _go_on_with_estimates(self, estimates: Iterable[Estimate]) -> None:
         """Go on with other estimates, if that costs nothing."""

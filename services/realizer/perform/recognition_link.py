@@ -5,9 +5,7 @@ Recognition may not be there, or die. Then the clock decides its events, so who 
 
 import asyncio
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
-
-from msgspec import Struct
+from typing import Any, NamedTuple
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behavior_types import canonical_sync
@@ -78,39 +76,35 @@ UNPROMISED: Seconds = 30.0
 """Time from the robot's last deed that a recognizer has which promises none, before its event is given up."""
 
 
-class Decision(Struct, frozen=True):
+class Decision(NamedTuple):
     """Time of an event's decision; by recognition, or by the realizer if recognition does not decide."""
 
     at: Seconds
     by_recognition: bool
 
 
-class RecognitionLink:
-    """Asks recognition for the events of one block."""
+class RecognitionLink(NamedTuple):
+    """Asks recognition for the events of one block. deeds: times when the robot last did something of each block."""
 
-    def __init__(
-        self, bus: Bus, requests: Requester, peers: Presence, deeds: Callable[[], Iterable[Seconds]]
-    ) -> None:
-        """deeds: times when the robot last did something of each block."""
-        self._bus = bus
-        self._requests = requests
-        self._peers = peers
-        self._deeds = deeds
+    bus: Bus
+    requests: Requester
+    peers: Presence
+    deeds: Callable[[], Iterable[Seconds]]
 
     def signal(self, id: str, block: str, signal: TurnSignal) -> None:
         """Tell recognition what became of a turn. The answer does not matter."""
-        message = SignalTurn(id=id, signal=signal, at=self._bus.stamp(), block=block)
-        if "recognition" in self._peers:
-            self._requests.send(keys.TURN, message)
+        message = SignalTurn(id=id, signal=signal, at=self.bus.stamp(), block=block)
+        if "recognition" in self.peers:
+            self.requests.send(keys.TURN, message)
         else:
-            self._bus.publish(keys.command(keys.TURN, self._bus.role, self._bus.name), message)
+            self.bus.publish(keys.command(keys.TURN, self.bus.role, self.bus.name), message)
 
     def ask(self, id: str, block: str, event: Event, began: Seconds) -> Pending | None:
         """Request the event; None if recognition is not there to decide it."""
-        if "recognition" not in self._peers:
+        if "recognition" not in self.peers:
             return None
-        request = RequestEvent(id=id, block=block, event=event, at=self._bus.stamp(began))
-        return self._requests.send(keys.EVENT, request)
+        request = RequestEvent(id=id, block=block, event=event, at=self.bus.stamp(began))
+        return self.requests.send(keys.EVENT, request)
 
     async def decision(self, event: Event, block: Block, pending: Pending | None, facts: Facts) -> Decision:
         """Wait for the decision of an event. Raises RequestRefused.
@@ -120,7 +114,7 @@ class RecognitionLink:
         is not counted. facts: those of the block, as they grow.
         """
         began = deed = facts.reached[Point(event.id, "start")]
-        time = Silences[str](self._bus.sight)
+        time = Silences[str](self.bus.sight)
         while True:
             if pending is not None and pending.outcome.done():
                 try:
@@ -128,27 +122,27 @@ class RecognitionLink:
                 except RequestRefused:
                     raise
                 except ServerRestarted:
-                    return Decision(self._bus.now(), False)  # Its new life knows nothing of the event.
+                    return Decision(self.bus.now(), False)  # Its new life knows nothing of the event.
                 except EngageError:
                     pending = None  # Recognition has died.
                     continue
-                at = self._bus.local(decided.at) if isinstance(decided, EventOutcome) else self._bus.now()
+                at = self.bus.local(decided.at) if isinstance(decided, EventOutcome) else self.bus.now()
                 return Decision(at, True)
-            now = self._bus.now()
-            deed = max(deed, *self._deeds())
-            if pending is None or "recognition" not in self._peers:
+            now = self.bus.now()
+            deed = max(deed, *self.deeds())
+            if pending is None or "recognition" not in self.peers:
                 due = event_deadline(event, block, facts.reached)
             else:
                 due = deed + (UNPROMISED if pending.within is None else pending.within)
             time.keep("decision", due + facts.held_between(began, now, event.id), now)
             if time.due(now + EPSILON) is not None:
                 if pending is not None:
-                    late = self._bus.sight.fault("no decision in time", "", "late", "recognition", "", deed)
-                    self._requests.cancel(pending.request.id, late)
-                return Decision(self._bus.now(), False)
+                    late = self.bus.sight.fault("no decision in time", "", "late", "recognition", "", deed)
+                    self.requests.cancel(pending.request.id, late)
+                return Decision(self.bus.now(), False)
             assert time.earliest is not None
             # The deadline is computed again after this: meanwhile points were reached, or the promise was heard.
-            news: list[asyncio.Future[Any]] = [self._peers.changed]
+            news: list[asyncio.Future[Any]] = [self.peers.changed]
             if pending is not None:
                 news += [each for each in (pending.outcome, pending.accepted) if not each.done()]
             await asyncio.wait(news, timeout=time.earliest - now, return_when=asyncio.FIRST_COMPLETED)

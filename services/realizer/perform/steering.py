@@ -138,7 +138,7 @@ class Steering:
     def _can_wait(self, live: Live, behavior: str) -> bool:
         """True if the behavior can still be made to wait."""
         performance = self._performances.get(live.request.id)
-        return self.is_going_on(live, behavior) and (performance is None or performance.can_wait(behavior))
+        return self.is_going_on(live, behavior) and (performance is None or performance.decisions.can_wait(behavior))
 
     async def interrupt(self, live: Live, behavior: str, reason: str = "") -> bool:
         """End a behavior that is going on, or take it out if its block has yet to begin.

@@ -10,6 +10,7 @@ rehearsed once more (`Rehearsing`). Nothing waits for the answer.
 import asyncio
 from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
@@ -18,10 +19,10 @@ from engage_hri.schemas.blocks import Block, PerformBlock
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateBehaviors, EstimateItem, Estimates, PlannedTime
 from engage_hri.schemas.check import validated
 from engage_hri.schemas.faults import EngageError, Fault, NoReply
+from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Containing
 from engage_hri.services.realizer.decide.decisions import Decisions
-from engage_hri.services.realizer.inputs import BodyAnswered, behaviors_asked
 from engage_hri.services.realizer.plan.agreement import (
     NOTICEABLE,
     STRAIGHT,
@@ -42,6 +43,7 @@ from engage_hri.services.realizer.points import Point, frozen, performer
 from engage_hri.services.realizer.together.knowledge import Asker, knowledge, may_share, parts_of
 from engage_hri.services.realizer.together.live import Live
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks, Past
+from engage_hri.services.runtime.ledger import fingerprint
 from engage_hri.services.runtime.unhurried import unhurried
 
 ESTIMATE: Seconds = 2.0
@@ -53,6 +55,25 @@ MOST_BEHAVIORS = 200
 block: 0.3 ms with 200 behaviors (decision 0142), and all other blocks wait meanwhile."""
 MOST = 2000
 """Behaviors, marks and sync references of a block: planning takes 0.1 ms each."""
+
+
+class BodyAnswered(Struct, frozen=True, kw_only=True, tag="body_answered", omit_defaults=True):
+    """The body answered a question for estimates: the input of the realizer that comes by no message.
+
+    asked: fingerprint of the behaviors. refused: fault with which it was answered, in place of estimates.
+    """
+
+    asked: str
+    answer: Estimates | None = None
+    refused: Fault | None = None
+
+
+RealizerInput = Message | BodyAnswered
+
+
+def behaviors_asked(question: EstimateBehaviors) -> str:
+    """Fingerprint of the behaviors that a question is about, whatever the times at which they are to come."""
+    return fingerprint([item.behavior for item in question.items])
 
 
 class Planning:
