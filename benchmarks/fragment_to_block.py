@@ -48,11 +48,10 @@ from benchmarks.measuring import Measurer, SteppedLoop, Stopwatch
 from benchmarks.reference_policy import references, table
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import FragmentBehavior, Reference, Speech
-from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
-from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.schemas.blocks import BlockOutcome, BlockProgress, PerformBlock
 from engage_hri.schemas.fragments import PerformFragment, TurnFragment
+from engage_hri.schemas.participants import PeerAlive
 from engage_hri.schemas.perception import HeadPose
-from engage_hri.schemas.presence import PeerAlive
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus, Hub

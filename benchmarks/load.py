@@ -42,8 +42,8 @@ from engage_hri.schemas.behaviors import Speech, Wait
 from engage_hri.schemas.blocks import Block, PerformBlock
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.fragments import PerformFragment, TurnFragment
+from engage_hri.schemas.participants import AskStatus, Status
 from engage_hri.schemas.perception import HeadPose
-from engage_hri.schemas.status import AskStatus, Status
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub

@@ -38,7 +38,7 @@ from benchmarks.sync_to_command import (
 )
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.presence import PeerAlive
+from engage_hri.schemas.participants import PeerAlive
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.commandline.shell.process import run, run_until_signal
 from engage_hri.services.recording.disk import read

@@ -19,7 +19,7 @@ import aiohttp
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActorFound
+from engage_hri.schemas.perception import ActionBegan, ActorFound
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.zenoh.hub import open_hub
 from tests.bus.places import free_endpoint

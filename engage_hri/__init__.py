@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from engage_hri.services.client.language_models import stream as stream
     from engage_hri.services.client.people.perceive import perceive as perceive
     from engage_hri.services.client.people.perceived_person import PerceivedPerson as PerceivedPerson
-    from engage_hri.services.client.results import PerformFailed as PerformFailed
+    from engage_hri.services.client.robot import PerformFailed as PerformFailed
     from engage_hri.services.client.robot import Robot as Robot
     from engage_hri.services.client.robot import connect as connect
     from engage_hri.services.commandline.embedding import embedded as embedded
@@ -74,8 +74,7 @@ _PLACES = {
     "engage_hri.schemas.world": ("Entity", "World"),
     "engage_hri.services.client.people.perceive": ("perceive",),
     "engage_hri.services.client.people.perceived_person": ("PerceivedPerson",),
-    "engage_hri.services.client.results": ("PerformFailed",),
-    "engage_hri.services.client.robot": ("Robot", "connect"),
+    "engage_hri.services.client.robot": ("PerformFailed", "Robot", "connect"),
     "engage_hri.services.commandline.embedding": ("embedded",),
     "engage_hri.services.control.contract.body": (
         "Arrived",

@@ -14,9 +14,10 @@ from msgspec import Struct, field
 from msgspec.structs import replace
 
 from engage_hri.schemas import behaviors as of
-from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.units import Seconds
 
+SYNC_POINTS = ("start", "ready", "stroke_start", "stroke", "stroke_end", "relax", "end")
+"""Sync points of every behavior but speech, in order, in the drafts' spelling, which all code uses."""
 Performer = Literal["body", "recognition", "clock"]
 
 _ENDS = ("start", "end")

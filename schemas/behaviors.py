@@ -1,7 +1,7 @@
 """Behaviors, of which blocks and turn fragments are made: one struct for each element of BML and its extension.
 
 The dialects of BML (thesis draft, draft without namespace, BML 1.0) decode to these same structs. A sync
-reference stays the string its author wrote (`speech-1:end+0.5`); `schemas/syncref.py` parses it.
+reference stays the string its author wrote (`speech-1:end+0.5`); `schemas/references.py` parses it.
 """
 
 from typing import Literal

@@ -1,4 +1,4 @@
-"""BML blocks, the commands about them, and their outcomes."""
+"""BML blocks, the commands about them, what is told while they are performed, and their outcomes."""
 
 from typing import Literal
 
@@ -6,8 +6,105 @@ from msgspec import Struct
 
 from engage_hri.schemas.behaviors import BlockBehavior, Constraint
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.requests import Outcome, Request
+from engage_hri.schemas.units import Seconds, Stamp
+
+WarningKind = Literal[
+    "PARSING_FAILURE", "NO_SUCH_TARGET", "IMPOSSIBLE_TO_SCHEDULE", "BEHAVIOR_TYPE_NOT_SUPPORTED",
+    "CUSTOM_BEHAVIOR_NOT_SUPPORTED", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED",
+    "CANNOT_CREATE_BEHAVIOR", "EXECUTION_FAILURE", "LATE", "POLICY",
+    "INTERRUPTED", "DEGRADED",
+]  # fmt: skip
+"""CUSTOM_BEHAVIOR_NOT_SUPPORTED, CUSTOM_ATTRIBUTE_NOT_SUPPORTED: it is of a namespace that is not BML's.
+DEGRADED: a behavior is performed with the nearest that the body has, or without a detail; nothing is dropped.
+INTERRUPTED: a behavior was ended on request, or was held for too long; without a behavior: its block or all was.
+POLICY: generation performs a fragment otherwise than it asks, for example with a less reliable reference."""
+
+
+class BlockProgress(Struct, frozen=True, kw_only=True, tag="block_progress", omit_defaults=True):
+    """evt: a block has started, or ended with a status.
+
+    block: its id. time: seconds since the block's start. status: empty at its start.
+    """
+
+    block: str | None
+    progress: Literal["start", "end"]
+    at: Stamp
+    time: Seconds = 0.0
+    status: Literal["", "done", "failed", "interrupted"] = ""
+    character_id: str = ""
+
+
+class SyncPointProgress(Struct, frozen=True, kw_only=True, tag="sync_point_progress", omit_defaults=True):
+    """evt: a sync point was realised. Each default point of each behavior exactly once, in order.
+
+    sync: in the spelling of the block's dialect.
+    at: instant as measured, but never before that of an earlier message about the block.
+    time: the same in seconds since the block's start.
+    predicted: time at which the last prediction had it. arrived: time at which the body came to it.
+    skew: seconds after the first of the sync points that should be the same instant.
+    source: `body`: the body reported it; `clock`: the realizer itself realised it.
+    """
+
+    block: str
+    behavior: str
+    sync: str
+    at: Stamp
+    time: Seconds
+    predicted: Seconds | None = None
+    arrived: Seconds | None = None
+    skew: Seconds = 0.0
+    source: Literal["body", "clock"] = "body"
+    character_id: str = ""
+
+
+class PlannedPoint(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A sync point with the time at which it is expected.
+
+    time: seconds since the block's start. type: the BML element of its behavior.
+    """
+
+    behavior: str
+    sync: str
+    time: Seconds
+    type: str = ""
+
+
+class PredictionFeedback(Struct, frozen=True, kw_only=True, tag="prediction", omit_defaults=True):
+    """evt: the expected times of a block's coming sync points.
+
+    Sent when the block starts, and again when an expectation has moved noticeably.
+
+    at: when the block started.
+    """
+
+    block: str
+    points: tuple[PlannedPoint, ...]
+    at: Stamp | None = None
+    character_id: str = ""
+
+
+class WarningFeedback(Struct, frozen=True, kw_only=True, tag="warning", omit_defaults=True):
+    """evt: something was refused, dropped or done otherwise than asked.
+
+    block: its id; null if it could not be read. behavior: id; empty: the warning is about the whole block.
+    """
+
+    block: str | None
+    kind: WarningKind
+    message: str
+    behavior: str = ""
+    at: Stamp | None = None
+    character_id: str = ""
+
+    @property
+    def place(self) -> str:
+        """Name of the thing that the warning is about: `block:behavior`, or the block alone."""
+        return ":".join(part for part in (self.block, self.behavior) if part)
+
+
+Feedback = BlockProgress | SyncPointProgress | PredictionFeedback | WarningFeedback
+
 
 Composition = Literal["MERGE", "APPEND", "REPLACE"]
 Dialect = Literal["draft", "bml-1.0"]
@@ -149,3 +246,151 @@ class BlockOutcome(Outcome, frozen=True, kw_only=True, tag="block_outcome", omit
     """Ids of behaviors that were ended by `InterruptBehavior`, each with a warning as well."""
     replaced_by: str = ""
     fault: Fault | None = None
+
+
+class Hold(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A hold that is in force.
+
+    block: id of a live block; empty: all that the robot performs, and what comes. behavior: of that block; empty: all
+    of it. since: when it began. until: when what it holds is stopped, unless somebody lets it go on before. why: what
+    has happened, and whose it was; None: somebody has asked for it.
+    """
+
+    since: Stamp
+    until: Stamp
+    block: str = ""
+    behavior: str = ""
+    why: Fault | None = None
+
+    def holds(self, other: "Hold") -> bool:
+        """True if what the other holds is the same as what this one holds, or a part of it."""
+        return not self.block or (self.block == other.block and self.behavior in ("", other.behavior))
+
+
+class Held(Struct, frozen=True, kw_only=True, tag="held", omit_defaults=True):
+    """state: realizer. All holds that are in force, the oldest first; none: nothing is held.
+
+    Published at every change; a late subscriber gets the last one. Of a hold that is not among them any more, what it
+    held goes on, or has ended.
+
+    at: when it was published.
+    """
+
+    at: Stamp
+    holds: tuple[Hold, ...] = ()
+
+
+class BodyHeld(Struct, frozen=True, kw_only=True, tag="body_held", omit_defaults=True):
+    """state: control. All behaviors that wait because whoever asked for them is not heard (`held_after`), the oldest
+    first; none: nothing waits for that.
+
+    Published at every change; a late subscriber gets the last one. Of a behavior that is not among them any more, its
+    requester was heard again, or it has ended; `until` is when it ends otherwise.
+
+    at: when it was published.
+    """
+
+    at: Stamp
+    holds: tuple[Hold, ...] = ()
+
+    @property
+    def reasons(self) -> list[str]:
+        """Reasons of these holds in words, each once."""
+        return sorted({each.why.reason for each in self.holds if each.why is not None})
+
+
+class NetPoint(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A sync point. behavior: empty for the start and the end of the block itself. sync: as the block spells it."""
+
+    behavior: str = ""
+    sync: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.behavior or 'bml'}:{self.sync}"
+
+
+class NetTransition(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """An instant. points: those that share it. time: seconds from the block's start, as planned."""
+
+    points: tuple[NetPoint, ...]
+    time: Seconds = 0.0
+
+    @property
+    def name(self) -> str:
+        """All points, as `gaze-1:stroke = point-1:start`."""
+        return " = ".join(map(str, self.points))
+
+
+class NetPlace(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A place between two transitions, named by their numbers.
+
+    kind: `phase` of a behavior, `delay`, `order`, `series`, `handover` or `idle`. lag: least seconds that a token
+    takes through it. behavior: the one that has this phase, or that waits there.
+    """
+
+    kind: str
+    source: int
+    target: int
+    lag: Seconds = 0.0
+    behavior: str = ""
+
+
+class Fired(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A transition that has fired, `time` seconds after the block's start."""
+
+    transition: int
+    time: Seconds
+
+
+class NetSpeech(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A speech of a block. behavior: its id. text: the words that it is to say."""
+
+    behavior: str
+    text: str
+
+
+class NetPlanned(Struct, frozen=True, kw_only=True, tag="net_planned", omit_defaults=True):
+    """stream: realizer: the net that a block runs on, and where its tokens are; all that a late watcher needs.
+
+    Told at the block's start, when it is planned anew, and every two seconds. Points that the block's dialect gives
+    one name are told once.
+    at: when the block started. marked: numbers of the places that hold a token. fired: the transitions so far.
+    speeches: what the block is to say, in the order of the block, also of speeches that were dropped.
+    follows: ids of the blocks before it in the same turn that were live when it came.
+    """
+
+    block: str
+    at: Stamp
+    transitions: tuple[NetTransition, ...]
+    places: tuple[NetPlace, ...]
+    marked: tuple[int, ...] = ()
+    fired: tuple[Fired, ...] = ()
+    speeches: tuple[NetSpeech, ...] = ()
+    follows: tuple[str, ...] = ()
+
+
+class NetWaiting(Struct, frozen=True, kw_only=True, tag="net_waiting", omit_defaults=True):
+    """stream: realizer: a block waits for its turn, since its composition asks for that; it has no net yet.
+
+    Told when it begins to wait, whenever it waits for fewer, and every two seconds; then `NetPlanned` follows, or a
+    `NetMarked` that says that it is over.
+    since: when it began to wait. waits_for: ids of the live blocks that have to end before.
+    """
+
+    block: str
+    since: Stamp
+    waits_for: tuple[str, ...] = ()
+
+
+class NetMarked(Struct, frozen=True, kw_only=True, tag="net_marked", omit_defaults=True):
+    """stream: realizer: what has changed in the marking of a block's net since the last message.
+
+    fired: transitions, in order. put: places that hold a token now and did not. taken: places that did and do not.
+    is_over: the block has ended.
+    """
+
+    block: str
+    fired: tuple[Fired, ...] = ()
+    put: tuple[int, ...] = ()
+    taken: tuple[int, ...] = ()
+    is_over: bool = False

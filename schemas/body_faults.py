@@ -4,10 +4,10 @@ from collections.abc import Iterable, Mapping
 
 from msgspec import Struct
 
+from engage_hri.schemas.behavior_types import SYNC_POINTS
 from engage_hri.schemas.body import Capabilities, FaultKind
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.requests import Outcome, Request
-from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.units import Stamp
 
 

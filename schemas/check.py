@@ -11,13 +11,23 @@ from itertools import pairwise
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.behavior_types import canonical_sync
+from engage_hri.schemas.advice import suggestion
+from engage_hri.schemas.behavior_types import SYNC_POINTS, canonical_sync
 from engage_hri.schemas.behaviors import LONGEST_SPEECH, Behavior, Event, Head, Reference, Speech, Wait
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import LONGEST_WITHIN, TurnFragment
-from engage_hri.schemas.references import AnyInput, Input, disambiguated, marks, sites
-from engage_hri.schemas.suggestion import suggestion
-from engage_hri.schemas.syncref import BLOCK_ITSELF, LONGEST_ID, SYNC_POINTS, SyncRef, is_id, objection
+from engage_hri.schemas.references import (
+    BLOCK_ITSELF,
+    LONGEST_ID,
+    AnyInput,
+    Input,
+    SyncRef,
+    disambiguated,
+    is_id,
+    marks,
+    objection,
+    sites,
+)
 
 MOST_NODS = 1000
 _SYNC_ADVICE = "write behavior:sync, behavior:sync+seconds, or seconds from the block's start"

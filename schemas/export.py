@@ -15,7 +15,7 @@ from typing import Any
 
 import msgspec
 
-from engage_hri.schemas import lines, tool
+from engage_hri.schemas import messages, tool
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.messages import MAJOR, Message
@@ -47,11 +47,11 @@ def bundle() -> dict[str, Any]:
 
 def _lines() -> dict[str, Any]:
     """Definitions of `Line`: like the messages, but every key is required, and an instant is a number."""
-    (line,), components = msgspec.json.schema_components((lines.LineMessage,), ref_template="#/$defs/{name}Line")
+    (line,), components = msgspec.json.schema_components((messages.LineMessage,), ref_template="#/$defs/{name}Line")
     for component in components.values():
         if "properties" in component:
             component["required"] = list(component["properties"])
-    components[Stamp.__name__] = dict(lines.INSTANT)
+    components[Stamp.__name__] = dict(messages.INSTANT)
     made = {f"{name}Line": component for name, component in components.items()}
     return made | {"Line": {"description": "One line of `engage watch --json`.", **line}}
 

@@ -1,15 +1,16 @@
-"""Turn fragments, which a collaboration manager sends to generation, and their outcomes."""
+"""Requests to generation, and its news: turn fragments and their outcomes, the owner of the head and what inhibits
+its looks, and the conditions of a study, of which one person may meet several (thesis, chapter 5)."""
 
-from typing import Literal
+from typing import Annotated, ClassVar, Literal
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from engage_hri.schemas.behaviors import Action, Constraint, FragmentBehavior, Reference, Speech
 from engage_hri.schemas.blocks import SpokenText, Unread
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.requests import Outcome, Request
-from engage_hri.schemas.speakable import has_words
+from engage_hri.schemas.text import has_words
 from engage_hri.schemas.units import Probability, Seconds, Stamp
 
 TurnStatus = Literal["beginning", "middle", "end", "full", "backchannel"]
@@ -51,7 +52,7 @@ class TurnFragment(Struct, frozen=True, kw_only=True, tag="fragment", omit_defau
     """Parts of the document that were left out. The realizer warns of each when the block of the fragment begins."""
     from_parts: bool = False
     """True for a language model's tool call: each behavior is one part, and refusals name it
-    (schemas/tool_call.py)."""
+    (schemas/tool.py)."""
     line: int = 0
 
     @property
@@ -189,3 +190,133 @@ class TurnClosed(Struct, frozen=True, kw_only=True, tag="turn_closed", omit_defa
     """Each connection event of the turn in its last known state, by start."""
     heard: tuple[HeardText, ...] = ()
     """What people have said since the turn before was over, its answer among it, by start."""
+
+
+ClaimKind = Literal["inhibition", "fragment", "glance", "response", "hands", "face", "none"]
+
+
+class Claim(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A wish for the robot's gaze, by which the arbiter decides about the head.
+
+    priority: 1 (inhibition, the strongest) to 6 (face); 0 with kind `none`.
+    target: entity id; empty: hold the direction.
+    reason: why, in words, for people.
+    """
+
+    kind: ClaimKind
+    priority: int
+    target: str = ""
+    reason: str = ""
+
+
+class HeadOwner(Struct, frozen=True, kw_only=True, tag="head_owner", omit_defaults=True):
+    """state: generation. The claim that owns the head, and the claims that wait.
+
+    Published at every change of the owner, of its target or reason, or of the waiting claims; a late subscriber gets
+    the last one.
+
+    since: when this owner got the head.
+    waiting: the strongest first.
+    """
+
+    owner: Claim
+    since: Stamp
+    waiting: tuple[Claim, ...] = ()
+
+
+class Inhibit(Request, frozen=True, kw_only=True, tag="inhibit", omit_defaults=True):
+    """cmd: anyone -> generation: a lease that inhibits gaze or pointing. Ends in `InhibitionEnded`.
+
+    A gaze or a pointing of the running fragment is aborted, those of later fragments are left out. The newest lease
+    on a part counts. It ends when `ttl` has passed without a `KeepAlive` or being sent again, and with its owner's
+    life.
+
+    part: what is inhibited: the gaze, or pointing with one arm.
+    mode: of the gaze: `release` lets the head go back to the base gaze, `hold` keeps the direction, `target` looks at
+    `target`. Without meaning for an arm.
+    ttl: how long the lease lasts without renewal.
+    target: entity id, with mode `target`.
+    """
+
+    is_updatable: ClassVar[bool] = True
+
+    part: Literal["gaze", "point-left", "point-right"] = "gaze"
+    mode: Literal["release", "hold", "target"] = "hold"
+    ttl: Seconds = 5.0
+    target: str = ""
+
+    @property
+    def term(self) -> Seconds:
+        return self.ttl
+
+
+class InhibitionEnded(Outcome, frozen=True, kw_only=True, tag="inhibition_ended", omit_defaults=True):
+    """evt: generation -> requester: the lease has ended.
+
+    reason: `lapsed`: not renewed; `released`: cancelled; `owner_lost`: its owner has gone from the bus.
+    """
+
+    reason: Literal["lapsed", "released", "owner_lost"] = "lapsed"
+
+
+LONGEST_NAME = 80
+"""Characters of a condition's name, and of the name of who set it."""
+ConditionName = Annotated[str, Meta(max_length=LONGEST_NAME)]
+
+
+class SetCondition(Request, frozen=True, kw_only=True, tag="set_condition", omit_defaults=True):
+    """cmd: operator or wizard -> generation: this condition begins now. Ends in `ConditionSet`.
+
+    name: any name, by which `engage analyse` tells the conditions apart; empty: what comes belongs to none.
+    speech_only: the robot says the words of the task and does nothing else, its head to the upper right, as in the
+        condition `degraded-generation`. What is under way of looks and points is broken off, as by an inhibition.
+    by: who sets it, for the record; empty: the requester.
+    """
+
+    name: ConditionName = ""
+    speech_only: bool = False
+    by: ConditionName = ""
+
+
+class ConditionSet(Outcome, frozen=True, kw_only=True, tag="condition_set", omit_defaults=True):
+    """evt: terminal state of `SetCondition`: this is in force."""
+
+    name: str = ""
+    speech_only: bool = False
+
+
+class StudyCondition(Struct, frozen=True, kw_only=True, tag="study_condition", omit_defaults=True):
+    """state: generation. The condition in force.
+
+    Published at the start, with what the configuration says of `speech_only`, and whenever one is set; a late
+    subscriber gets the last one.
+
+    at: when it began. name: empty: none has been set. by: who set it; empty: the configuration.
+    """
+
+    at: Stamp
+    name: str = ""
+    speech_only: bool = False
+    by: str = ""
+
+    @property
+    def is_told(self) -> bool:
+        """True if people are to hear of it: somebody set it, or the configuration leaves the robot words alone."""
+        return bool(self.by) or self.speech_only
+
+    @property
+    def sentence(self) -> str:
+        """Words for people: which it is, and who set it."""
+        by = f", set by {self.by}" if self.by else ""
+        return f"condition of the study: {condition_words(self.name, self.speech_only)}{by}"
+
+    @property
+    def lost_sentence(self) -> str:
+        """Words for people when it went with its generation, and is in force no more."""
+        was = f"{condition_words(self.name, self.speech_only)!r}, set by {self.by}"
+        return f"condition of the study: none, for generation has gone, and with it {was}: begin it again"
+
+
+def condition_words(name: str, speech_only: bool) -> str:
+    """A condition in words, for people."""
+    return f"{name or 'none'}{', speech only' if speech_only else ''}"

@@ -1,98 +1,75 @@
-"""All messages of the bus as one tagged union, and their two encodings."""
+"""All messages of the bus as one tagged union, their two encodings, and the lines that people and programs read.
+
+A line of `--feedback`, `--events` and `engage watch` is the JSON form of its message (docs/protocol.md; `Line` in
+exported/engage.json), made easier for a program that knows nothing else of the bus: every key is always there, even
+at its default, and an instant is a number, the seconds of the bus clock. Seconds are rounded to microseconds.
+"""
 
 from collections.abc import Mapping
 from functools import cache, lru_cache
-from typing import Any
+from typing import Any, get_args
 
 import msgspec
+from msgspec import Struct
 
-from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
-from engage_hri.schemas.attention import HeadOwner, Inhibit, InhibitionEnded
-from engage_hri.schemas.blocks import (
-    BehaviorInterrupted,
-    BlockOutcome,
-    InterruptBehavior,
-    PerformanceSteered,
-    PerformBlock,
-    SteerPerformance,
-    SteerRobot,
+from engage_hri.schemas import (
+    blocks,
+    body,
+    body_faults,
+    fragments,
+    keys,
+    participants,
+    perception,
+    recognition,
+    requests,
+    world,
 )
-from engage_hri.schemas.body import (
-    AbortBehavior,
-    BehaviorAborted,
-    BehaviorOutcome,
-    Capabilities,
-    DescribeBody,
-    EstimateBehaviors,
-    Estimates,
-    GoHome,
-    HomeReached,
-    PerformBehavior,
-    RobotSeen,
-    RobotState,
-    SyncPointArrived,
-    SyncPointReached,
-    WordSpoken,
-)
-from engage_hri.schemas.body_faults import BodyFaults, FaultsSwitched, SwitchFaults
-from engage_hri.schemas.conditions import ConditionSet, SetCondition, StudyCondition
+from engage_hri.schemas.access import LARGEST, check_size
+from engage_hri.schemas.blocks import Feedback
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
-from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed
-from engage_hri.schemas.holds import BodyHeld, Held
-from engage_hri.schemas.ledger import Taken
-from engage_hri.schemas.limits import LARGEST, check_size
-from engage_hri.schemas.nets import NetMarked, NetPlanned, NetWaiting
-from engage_hri.schemas.perception import HeadPose, Utterance, VoiceActivity
-from engage_hri.schemas.presence import PeerAlive, PeerGone
-from engage_hri.schemas.recognition import (
-    ConnectionEvent,
-    EventOutcome,
-    OpenEvents,
-    RequestEvent,
-    SignalTurn,
-    Statistics,
-    TurnOutcome,
-)
-from engage_hri.schemas.requests import Accepted, Cancel, Heard, KeepAlive, Outdated, Refused, Request, Unreadable
-from engage_hri.schemas.settings import ServiceSettings
-from engage_hri.schemas.status import AskStatus, Status
-from engage_hri.schemas.world import World
+from engage_hri.schemas.units import Stamp
 
 MAJOR = 1
 
 Message = (
-    Heard | Accepted | Outdated | Refused | Cancel | KeepAlive | Unreadable | Fault
-    | PerformFragment | FragmentOutcome | TurnClosed | Inhibit | InhibitionEnded | HeadOwner
-    | SetCondition | ConditionSet | StudyCondition
-    | PerformBlock | BlockOutcome | InterruptBehavior | BehaviorInterrupted | SteerPerformance | SteerRobot
-    | PerformanceSteered | Held | BodyHeld | NetPlanned | NetMarked | NetWaiting
-    | BlockProgress | SyncPointProgress | PredictionFeedback | WarningFeedback
-    | PerformBehavior | AbortBehavior | BehaviorAborted | GoHome | HomeReached | BehaviorOutcome
-    | SyncPointArrived | SyncPointReached | WordSpoken | RobotState | RobotSeen
-    | SwitchFaults | FaultsSwitched | BodyFaults | DescribeBody | Capabilities | EstimateBehaviors | Estimates
-    | ActionBegan | ActionEnded | ActorFound | ActorLost | OngoingActions | Utterance
-    | World | HeadPose | VoiceActivity
-    | RequestEvent | EventOutcome | SignalTurn | TurnOutcome | ConnectionEvent | OpenEvents | Statistics | Taken
-    | AskStatus | Status | ServiceSettings | PeerAlive | PeerGone
+    requests.Heard | requests.Accepted | requests.Outdated | requests.Refused | requests.Cancel
+    | requests.KeepAlive | requests.Unreadable
+    | Fault
+    | fragments.PerformFragment | fragments.FragmentOutcome | fragments.TurnClosed | fragments.Inhibit
+    | fragments.InhibitionEnded | fragments.HeadOwner | fragments.SetCondition | fragments.ConditionSet
+    | fragments.StudyCondition
+    | blocks.PerformBlock | blocks.BlockOutcome | blocks.InterruptBehavior | blocks.BehaviorInterrupted
+    | blocks.SteerPerformance | blocks.SteerRobot | blocks.PerformanceSteered | blocks.Held | blocks.BodyHeld
+    | blocks.NetPlanned | blocks.NetMarked | blocks.NetWaiting | blocks.BlockProgress | blocks.SyncPointProgress
+    | blocks.PredictionFeedback | blocks.WarningFeedback
+    | body.PerformBehavior | body.AbortBehavior | body.BehaviorAborted | body.GoHome | body.HomeReached
+    | body.BehaviorOutcome | body.SyncPointArrived | body.SyncPointReached | body.WordSpoken | body.RobotState
+    | body.RobotSeen | body.DescribeBody | body.Capabilities | body.EstimateBehaviors | body.Estimates
+    | body_faults.SwitchFaults | body_faults.FaultsSwitched | body_faults.BodyFaults
+    | perception.ActionBegan | perception.ActionEnded | perception.ActorFound | perception.ActorLost
+    | perception.OngoingActions | perception.Utterance | perception.HeadPose | perception.VoiceActivity
+    | world.World
+    | recognition.RequestEvent | recognition.EventOutcome | recognition.SignalTurn | recognition.TurnOutcome
+    | recognition.ConnectionEvent | recognition.OpenEvents | recognition.Statistics
+    | participants.Taken | participants.AskStatus | participants.Status | participants.ServiceSettings
+    | participants.PeerAlive | participants.PeerGone
 )  # fmt: skip
 """Union of all messages. The field `type` of the encoded form says which one it is."""
 
-COMMANDS: Mapping[str, tuple[type[Request], ...]] = {
-    keys.FRAGMENT: (PerformFragment,),
-    keys.INHIBIT: (Inhibit,),
-    keys.CONDITION: (SetCondition,),
-    keys.BLOCK: (PerformBlock, InterruptBehavior, SteerPerformance),
-    keys.ROBOT: (SteerRobot,),
-    keys.EVENT: (RequestEvent,),
-    keys.TURN: (SignalTurn,),
-    keys.BEHAVIOR: (PerformBehavior, AbortBehavior, GoHome),
-    keys.FAULTS: (SwitchFaults,),
+COMMANDS: Mapping[str, tuple[type[requests.Request], ...]] = {
+    keys.FRAGMENT: (fragments.PerformFragment,),
+    keys.INHIBIT: (fragments.Inhibit,),
+    keys.CONDITION: (fragments.SetCondition,),
+    keys.BLOCK: (blocks.PerformBlock, blocks.InterruptBehavior, blocks.SteerPerformance),
+    keys.ROBOT: (blocks.SteerRobot,),
+    keys.EVENT: (recognition.RequestEvent,),
+    keys.TURN: (recognition.SignalTurn,),
+    keys.BEHAVIOR: (body.PerformBehavior, body.AbortBehavior, body.GoHome),
+    keys.FAULTS: (body_faults.SwitchFaults,),
 }
 """Commands on each key; besides, `keys.cancel` takes `Cancel`, and `keys.keep_alive` takes `KeepAlive`."""
 
-OUTWARD = (ConnectionEvent, OpenEvents, Statistics, Utterance)
+OUTWARD = (recognition.ConnectionEvent, recognition.OpenEvents, recognition.Statistics, perception.Utterance)
 """Messages for programs of others, a few a second at most: published as JSON, which every language reads. All others
 are MessagePack."""
 
@@ -159,3 +136,35 @@ def _decoder_of(encoding: str) -> "msgspec.msgpack.Decoder[Any] | msgspec.json.D
     if form == "application/msgpack":
         return _msgpack_decoder
     raise InputRefused(Fault(reason=f"encoding {form!r}", advice="application/msgpack or application/json"))
+
+
+LineMessage = (
+    recognition.ConnectionEvent | recognition.Statistics | perception.Utterance | Fault
+    | fragments.HeadOwner | fragments.StudyCondition | body_faults.BodyFaults
+    | Feedback | blocks.Held | blocks.BodyHeld | blocks.NetPlanned | blocks.NetMarked | blocks.NetWaiting
+)  # fmt: skip
+"""Messages that have a line."""
+_KINDS = get_args(LineMessage)
+_DECIMALS = 6
+INSTANT = {"type": "number", "description": "seconds of the bus clock"}
+"""JSON Schema of an instant in a line."""
+
+
+def line(message: Message) -> str | None:
+    """Write a message as one line, without the line end; None for a message that has no line."""
+    return msgspec.json.encode(_plain(message)).decode() if isinstance(message, _KINDS) else None
+
+
+def _plain(value: Any) -> Any:
+    match value:
+        case Stamp():
+            return _plain(float(value.seconds))
+        case Struct():
+            tag = value.__struct_config__.tag
+            fields = {name: _plain(getattr(value, name)) for name in value.__struct_fields__}
+            return {"type": tag, **fields} if tag else fields
+        case tuple():
+            return [_plain(item) for item in value]
+        case float():
+            return round(value, _DECIMALS) + 0.0  # no negative zero
+    return value

@@ -11,7 +11,7 @@ from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import FragmentOutcome, HeardText
 from engage_hri.schemas.recognition import ConnectionEvent
-from engage_hri.schemas.speakable import joined
+from engage_hri.schemas.text import joined
 from engage_hri.schemas.units import Seconds
 
 LONGEST_PROBLEM = 160

@@ -1,10 +1,15 @@
-"""World as perception reports it: entities with their places and looks."""
+"""World as perception reports it: entities with their places and looks, and what is hidden for a moment.
+
+An object that a report of the world leaves out has rarely gone: people's hands hide pieces all the time (thesis
+5.4.2). So services remember it, and go on to speak of it and to look at it.
+"""
 
 from typing import Literal
 
 from msgspec import Struct
+from msgspec.structs import replace
 
-from engage_hri.schemas.units import Coordinate, Extent, Heading, Named, Probability, Stamp, Vector
+from engage_hri.schemas.units import Coordinate, Extent, Heading, Named, Probability, Seconds, Stamp, Vector
 
 EntityKind = Literal["object", "person", "hand", "surface"]
 
@@ -68,3 +73,44 @@ class World(Struct, frozen=True, kw_only=True, tag="world", omit_defaults=True):
     def people(self) -> tuple[Entity, ...]:
         """The people in the world."""
         return tuple(entity for entity in self.entities if entity.kind == "person")
+
+
+COVERED_FOR: Seconds = 10.0
+"""Time after which a missing object is taken to be gone, unless the configuration says otherwise."""
+
+
+class CoveredObjects:
+    """Adds to reports of the world the objects that they leave out, where they were seen last.
+
+    patience: seconds after which a missing object is taken to be gone.
+    """
+
+    def __init__(self, patience: Seconds) -> None:
+        self._patience = patience
+        self._world: World | None = None
+        self._objects: dict[str, Entity] = {}
+        self._missing: dict[str, Seconds] = {}
+        """Since when an object is missing, by id; `_objects` holds it as last seen."""
+
+    def see(self, world: World, now: Seconds) -> World:
+        """Take a report. Returns the world as it probably is now: the report with the covered objects."""
+        reported = {entity.id for entity in world.entities}
+        self._forget(now)
+        self._missing = {id: self._missing.get(id, now) for id in self._objects if id not in reported}
+        self._objects = {id: self._objects[id] for id in self._missing} | {one.id: one for one in world.objects}
+        self._world = world
+        return self._whole(world)
+
+    def at(self, now: Seconds) -> World | None:
+        """Return the world as it probably is; None before the first report."""
+        self._forget(now)
+        return None if self._world is None else self._whole(self._world)
+
+    def _forget(self, now: Seconds) -> None:
+        gone = [id for id, since in self._missing.items() if now - since > self._patience]
+        for id in gone:
+            del self._missing[id], self._objects[id]
+
+    def _whole(self, world: World) -> World:
+        covered = tuple(self._objects[id] for id in self._missing)
+        return replace(world, entities=(*world.entities, *covered)) if covered else world

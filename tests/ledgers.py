@@ -6,8 +6,8 @@ from typing import Any
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.ledger import Step, Taken
 from engage_hri.schemas.messages import decode, encode
+from engage_hri.schemas.participants import Step, Taken
 from engage_hri.services.bus.interface import Received
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.runtime.again import Again

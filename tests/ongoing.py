@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 
 
 def going_on(events: Sequence[Message], actor: str) -> tuple[ActionBegan, ...]:

@@ -5,8 +5,6 @@ SHELLS = {
     "services/realizer/perform/recognition_link.py",  # asks recognition
     "services/control/serving/state_publisher.py",  # publishes what the body shows
     "services/control/serving/questions.py",  # answers what behaviors would take
-    "services/control/serving/estimates.py",  # publishes mistakes of the body
-    "services/control/serving/warnings_told.py",  # publishes what a person has to see to
     "services/control/bases/driver_guard.py",  # times the calls of drivers by the clock of the loop
     "services/realizer/report.py",  # publishes feedback
     "services/realizer/perform/behavior_run.py",  # awaits and resolves sync points, awaits ends

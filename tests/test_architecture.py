@@ -33,10 +33,9 @@ PURE_MACHINERY = {
     "services/runtime/absent.py", "services/runtime/again.py", "services/runtime/installation.py",
     "services/runtime/intake.py", "services/runtime/ledger.py", "services/runtime/offers.py",
     "services/runtime/steps.py",
-    "services/client/chunking.py", "services/client/event_stream.py", "services/client/people/person_actions.py",
-    "services/client/people/shared_world.py", "services/client/people/utterances.py",
-    "services/bus/samples.py", "services/bus/payloads.py", "services/bus/often.py", "services/bus/sight.py",
-    "services/bus/zenoh/turns.py",
+    "services/client/chunking.py", "services/client/event_stream.py", "services/client/people/actions.py",
+    "services/client/people/shared_world.py", "services/bus/samples.py", "services/bus/payloads.py",
+    "services/bus/often.py", "services/bus/sight.py", "services/bus/zenoh/turns.py",
 }  # fmt: skip
 """Files of these packages that are pure themselves."""
 VISITOR = "examples/plain_zenoh_events.py"
@@ -63,8 +62,7 @@ LAYERS = {
     "services/control": "mujoco > reachy_mini service testing torso > bases calibrating serving > figure voice"
     " > contract > config motion",
     "services/commandline": "look robot study talk > app bodies embedding > shell",
-    "services/client": "language_models > robot > orders > feeds people > chunking event_stream hearing inputs"
-    " results",
+    "services/client": "language_models > robot > orders > feeds people > chunking event_stream inputs",
     "services/generation": "service > intake > fragments > performance > body_link choosing_again ways > exchange"
     " fragment_check > acts lost pipeline > block head names > references turns > permits > config",
     "services/realizer": "service > perform > export together > report > decide > foresee > plan > net"

@@ -7,12 +7,11 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.attention import Inhibit
 from engage_hri.schemas.behaviors import Gaze, Gesture, Pointing, Speech, Wait
 from engage_hri.schemas.blocks import Block, BlockOutcome, InterruptBehavior, PerformBlock
 from engage_hri.schemas.body import GoHome, PerformBehavior
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnFragment
+from engage_hri.schemas.fragments import FragmentOutcome, Inhibit, PerformFragment, TurnFragment
 from engage_hri.schemas.messages import encode_json
 from engage_hri.schemas.requests import Refused, Request
 from engage_hri.services.bus.memory import MemoryHub

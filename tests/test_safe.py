@@ -9,15 +9,13 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Pointing, Speech
-from engage_hri.schemas.blocks import BlockOutcome
+from engage_hri.schemas.blocks import BlockOutcome, BodyHeld
 from engage_hri.schemas.body import RobotState, WordSpoken
 from engage_hri.schemas.faults import Fault, RunFailed, ServerRestarted
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.holds import BodyHeld
 from engage_hri.schemas.messages import Message
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.results import PerformFailed
-from engage_hri.services.client.robot import Robot, connect
+from engage_hri.services.client.robot import PerformFailed, Robot, connect
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.realizer.config import LEASE, RealizerConfig

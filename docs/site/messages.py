@@ -9,32 +9,23 @@ from types import ModuleType
 import msgspec
 
 from engage_hri.schemas import (
-    actions,
-    attention,
     behaviors,
     blocks,
     body,
     body_faults,
-    conditions,
     faults,
-    feedback,
     fragments,
-    holds,
-    ledger,
-    nets,
+    participants,
     perception,
-    presence,
     recognition,
     requests,
-    settings,
-    status,
     units,
     world,
 )
 
 MODULES: tuple[ModuleType, ...] = (
-    fragments, blocks, behaviors, feedback, holds, nets, recognition, ledger, attention, conditions, actions,
-    perception, world, body, body_faults, requests, faults, presence, status, settings, units,
+    fragments, blocks, behaviors, recognition, perception, world, body, body_faults, requests, faults, participants,
+    units,
 )  # fmt: skip
 
 HEAD = """\

@@ -48,7 +48,7 @@ BESIDE = {
         "services.control.voice.synthesis.Synthesizer", "services.control.voice.synthesis.Phrase",
         "services.control.voice.synthesis.Said", "services.control.voice.synthesis.Heard",
         "services.control.voice.synthesis.Phone", "services.control.voice.sounding.SoundingVoice",
-        "services.control.voice.settings.VoiceSettings",
+        "services.control.voice.synthesis.VoiceSettings",
     ),
     "What goes wrong": ("services.control.contract.body.BodyFailed", "schemas.faults.NoReply"),
 }  # fmt: skip

@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from engage_hri.schemas.behavior_types import TYPES, BehaviorType
-from engage_hri.schemas.syncref import SYNC_POINTS
+from engage_hri.schemas.behavior_types import SYNC_POINTS, TYPES, BehaviorType
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "control.md"
 HEAD = "| behavior | sync points | may wait at |\n|---|---|---|\n"

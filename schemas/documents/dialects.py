@@ -7,11 +7,10 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.behavior_types import ROWS, dialect_sync, same_instant
+from engage_hri.schemas.behavior_types import ROWS, SYNC_POINTS, dialect_sync, same_instant
 from engage_hri.schemas.behaviors import After, Before, Behavior, Constraint, Speech, Synchronize, Timing
 from engage_hri.schemas.blocks import Block, Dialect
-from engage_hri.schemas.references import in_draft_spelling, respelled, sites
-from engage_hri.schemas.syncref import BLOCK_ITSELF, SYNC_POINTS, SyncRef
+from engage_hri.schemas.references import BLOCK_ITSELF, SyncRef, in_draft_spelling, respelled, sites
 
 EXTENSIONS = tuple([row.kind for row in ROWS if not row.is_standard])
 """Behaviors that no other realizer knows."""

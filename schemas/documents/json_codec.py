@@ -14,16 +14,16 @@ import msgspec
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas import allowed
+from engage_hri.schemas.access import LARGEST
+from engage_hri.schemas.advice import allowed
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.check import validated
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.documents.xml_grammar import snake
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.limits import LARGEST
-from engage_hri.schemas.tool_call import CALL, from_tool, is_tool_input
-from engage_hri.schemas.utf8 import begins_with, is_utf8, utf8
+from engage_hri.schemas.text import begins_with, is_utf8, utf8
+from engage_hri.schemas.tool import CALL, from_tool, is_tool_input
 
 T = TypeVar("T", Block, TurnFragment)
 
@@ -168,7 +168,7 @@ def _struct(parsed: dict[str, Any], kind: type[T], source: str, path: str) -> T:
         thing = msgspec.convert({**parsed, "type": kind.__struct_config__.tag}, kind)
     except msgspec.ValidationError as error:
         reason, _, where = str(error).partition(" - at `$")
-        told = allowed.advice(kind, where, parsed) if reason.startswith("Invalid enum value") else ""
+        told = allowed(error, kind) if reason.startswith("Invalid enum value") else ""
         raise _refusal(reason, f"{path}{where.rstrip('`')}", source, told or "see docs/protocol.md") from error
     except RecursionError as error:
         raise _refusal("nested too deep", path, source) from error

@@ -14,8 +14,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Mark, Speech
-from engage_hri.schemas.documents.escaping import escape, quoteattr
-from engage_hri.schemas.documents.xml_source import XML, local_name
+from engage_hri.schemas.documents.xml_source import XML, escape, local_name, quoteattr
 from engage_hri.schemas.units import Seconds
 
 Emphasis = Literal["", "strong", "moderate", "reduced"]

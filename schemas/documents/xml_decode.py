@@ -21,10 +21,11 @@ from typing import Any
 import msgspec
 from lxml import etree
 
-from engage_hri.schemas import allowed, vocabulary
 from engage_hri.schemas import behaviors as of
+from engage_hri.schemas import vocabulary
+from engage_hri.schemas.advice import allowed, meant
 from engage_hri.schemas.behavior_types import TYPES
-from engage_hri.schemas.blocks import Block, Unread
+from engage_hri.schemas.blocks import Block, Unread, WarningKind
 from engage_hri.schemas.check import check
 from engage_hri.schemas.documents import xml_grammar as grammar
 from engage_hri.schemas.documents.xml_encode import encode_xml
@@ -44,10 +45,8 @@ from engage_hri.schemas.documents.xml_source import (
     split,
 )  # fmt: skip
 from engage_hri.schemas.documents.xml_speech import MARKS, language, spoken
-from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import SYNC_NAMES, disambiguated, in_draft_spelling
-from engage_hri.schemas.suggestion import meant
 
 __all__ = ["decode_xml", "encode_xml"]
 
@@ -405,7 +404,7 @@ class _Document:
             lacks = grammar.attribute(missing[1]) if missing else ""
             what = f"no {lacks}" if missing else f"{grammar.attribute(field)}: {reason}"
             name = f"<{local_name(element)}" + (f" id={raw['id']!r}>" if raw.get("id") else ">")
-            advice = f'add {lacks}="..."' if missing else allowed.advice(kind, f".{field}", raw)
+            advice = f'add {lacks}="..."' if missing else allowed(error, kind)
             raise self._source.refusal(f"{name}: {what}", element, advice=advice) from error
 
 

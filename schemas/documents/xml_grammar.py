@@ -26,8 +26,7 @@ from engage_hri.schemas.documents.xml_source import (
     prefixed_name,
     split,
 )
-from engage_hri.schemas.references import SYNC_NAMES
-from engage_hri.schemas.syncref import SyncRef
+from engage_hri.schemas.references import SYNC_NAMES, SyncRef
 from engage_hri.schemas.vocabulary import SHAPES
 
 AnyStruct = TypeVar("AnyStruct", bound=msgspec.Struct)

@@ -10,9 +10,9 @@ from typing import cast
 
 from lxml import etree
 
+from engage_hri.schemas.access import LARGEST
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.limits import LARGEST
-from engage_hri.schemas.utf8 import utf8
+from engage_hri.schemas.text import utf8
 
 DRAFT = "org.mindmakers.bml"
 BML_1_0 = "http://www.bml-initiative.org/bml/bml-1.0"
@@ -223,3 +223,17 @@ def attributes(element: etree._Element) -> dict[str, str]:
     """Attributes of BML and EBML, by local name."""
     split_names = ((*split(str(name)), str(value)) for name, value in element.items())
     return {local: value for space, local, value in split_names if space in READ}
+
+
+_TEXT = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;"})
+_VALUE = _TEXT | str.maketrans({'"': "&quot;", "\n": "&#10;", "\r": "&#13;", "\t": "&#9;"})
+
+
+def escape(text: str) -> str:
+    """Write text between tags."""
+    return text.translate(_TEXT)
+
+
+def quoteattr(value: str) -> str:
+    """Write the value of an attribute, with its quotes."""
+    return f'"{value.translate(_VALUE)}"'

@@ -10,7 +10,6 @@ from typing import NamedTuple
 from lxml import etree
 
 from engage_hri.schemas.behaviors import Mark, Speech, Timing
-from engage_hri.schemas.documents.escaping import escape, quoteattr
 from engage_hri.schemas.documents.xml_source import (
     BML_1_0,
     CORE,
@@ -20,7 +19,9 @@ from engage_hri.schemas.documents.xml_source import (
     XML,
     Source,
     attributes,
+    escape,
     local_name,
+    quoteattr,
     split,
 )
 from engage_hri.schemas.faults import InputRefused

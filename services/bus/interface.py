@@ -20,8 +20,8 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.access import role_of
 from engage_hri.schemas.faults import Cause, EngageError, Fault, InputRefused, NoReply, bug
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.participants import BusHealth, ProcessFacts
 from engage_hri.schemas.requests import Request, Unreadable, kind_of, life_of
-from engage_hri.schemas.status import BusHealth, ProcessFacts
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.often import Often
@@ -176,7 +176,7 @@ class Bus(ABC):
 
         again: it was sent before, to one who may not have heard it; the log has its line.
 
-        Raises InputRefused for a message that is larger than its key allows (schemas/limits.py). One of a stream, of
+        Raises InputRefused for a message that is larger than its key allows (schemas/access.py). One of a stream, of
         which any may be lost, is not sent then, and the first such of a participant is told in the log.
         """
         if not again:

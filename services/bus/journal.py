@@ -11,15 +11,13 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActorFound, ActorLost
+from engage_hri.schemas.blocks import BlockProgress, BodyHeld, Held, Hold, WarningFeedback
 from engage_hri.schemas.body_faults import BodyFaults, words
-from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import BlockProgress, WarningFeedback
-from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
-from engage_hri.schemas.holds import BodyHeld, Held, Hold
+from engage_hri.schemas.fragments import FragmentOutcome, StudyCondition, TurnClosed
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
+from engage_hri.schemas.perception import ActorFound, ActorLost
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent
 from engage_hri.schemas.requests import Refused
 from engage_hri.schemas.units import Seconds

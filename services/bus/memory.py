@@ -13,8 +13,7 @@ from engage_hri.schemas.blocks import PerformBlock
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import PerformFragment
 from engage_hri.schemas.messages import Message, decode, in_form, published
-from engage_hri.schemas.presence import PeerAlive, PeerGone
-from engage_hri.schemas.status import BusHealth
+from engage_hri.schemas.participants import BusHealth, PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.answering import Answering

@@ -6,14 +6,14 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.access import LARGEST_XML_SENT, check_size
 from engage_hri.schemas.blocks import Block, PerformBlock
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.documents.xml_source import id_of
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.fragments import PerformFragment
-from engage_hri.schemas.limits import LARGEST_XML_SENT, check_size
 from engage_hri.schemas.messages import Message, decode
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Unreadable
 
 LOCAL = (PeerAlive, PeerGone, Unreadable)

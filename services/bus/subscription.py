@@ -9,7 +9,7 @@ from typing import Any, Generic, Self, TypeVar
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.messages import encode, encoding_of
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.samples import Received as Received
 from engage_hri.services.bus.samples import Sample as Sample

@@ -14,7 +14,7 @@ import re
 import unicodedata
 from collections.abc import Iterator
 
-from engage_hri.schemas.speakable import joined, word_count
+from engage_hri.schemas.text import joined, word_count
 from engage_hri.schemas.tool import Part, Refer, Say
 from engage_hri.services.text.ear import heard
 from engage_hri.services.text.ends import ends, next_end

@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection
 from msgspec.structs import replace
 
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, OpenEvents, session_of
 from engage_hri.schemas.units import Seconds, Stamp
 

@@ -6,10 +6,12 @@ from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.faults import Fault, NoReply
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Reading, Received, Subscription
 from engage_hri.services.client.event_stream import EventStream
+from engage_hri.services.client.inputs import taken
 from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports, events
 from engage_hri.services.reports.ongoing_actions import ActionEvent, TimedReport
 
@@ -44,6 +46,25 @@ class Feed(Reading[M]):
     def close(self) -> None:
         """End the feed: nothing more comes, and a task that waits in `next` gets None."""
         self._subscription.close()
+
+
+async def first_of(
+    feed: Feed[M], what: str, timeout: Seconds | None, is_wanted: Callable[[M], bool] = lambda message: True
+) -> M:
+    """Return the first message of a feed that is wanted, and close the feed.
+
+    what: its name, for the reader. Raises NoReply if none has come in time, InputRefused if `timeout` is no number.
+    """
+    with feed:
+        taken(timeout, Seconds | None, "timeout")
+        deadline = None if timeout is None else feed._now() + timeout
+        while True:
+            left = None if deadline is None else max(0.0, deadline - feed._now())
+            if (message := await feed.next(left)) is None:
+                within = " any more: the connection is over" if timeout is None else f" within {timeout} s"
+                raise NoReply(Fault(reason=f"no {what}{within}", advice="is its service running?"))
+            if is_wanted(message):
+                return message
 
 
 class NewFeed(Feed[M]):

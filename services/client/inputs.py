@@ -12,7 +12,7 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.messages import decode, published
 from engage_hri.schemas.requests import Request
-from engage_hri.schemas.tool_call import EXAMPLE
+from engage_hri.schemas.tool import EXAMPLE
 
 FragmentSource = TurnFragment | str | bytes | Path | dict[str, Any]
 """A fragment, or EBML or JSON that describes one (a language model's tool input, too), or the file it stands in."""

@@ -18,21 +18,18 @@ from typing import Any, Literal
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused, OutcomeUnknown
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed, TurnFragment, TurnStatus
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Accepted
 from engage_hri.schemas.summary import Summary, summary
-from engage_hri.schemas.tool import Part, ToolInput
-from engage_hri.schemas.tool_call import fragment_of
+from engage_hri.schemas.tool import Part, ToolInput, fragment_of
 from engage_hri.schemas.units import Seconds
-from engage_hri.schemas.world import World
+from engage_hri.schemas.world import COVERED_FOR, CoveredObjects, World
 from engage_hri.services.client.chunking import UNKNOWN, Chunk, Chunker
 from engage_hri.services.client.feeds import Feed
 from engage_hri.services.client.inputs import call_in, shown, taken
-from engage_hri.services.client.results import PerformFailed
-from engage_hri.services.client.robot import Robot
+from engage_hri.services.client.robot import PerformFailed, Robot
 from engage_hri.services.requests.ends import Patience, Pending
 from engage_hri.services.text.pieces import Ids
 

@@ -7,7 +7,6 @@ from itertools import count
 from typing import Any, Literal, Self
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.attention import Inhibit
 from engage_hri.schemas.blocks import (
     BehaviorInterrupted,
     InterruptBehavior,
@@ -18,17 +17,16 @@ from engage_hri.schemas.blocks import (
 )
 from engage_hri.schemas.body import Capabilities, DescribeBody
 from engage_hri.schemas.body_faults import BodyFault, BodyFaults, FaultsSwitched, SwitchFaults
-from engage_hri.schemas.conditions import ConditionSet, SetCondition, StudyCondition
 from engage_hri.schemas.faults import Fault, InputRefused, NoReply, RunFailed
+from engage_hri.schemas.fragments import ConditionSet, Inhibit, SetCondition, StudyCondition
 from engage_hri.schemas.requests import Outcome, Request
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Keep
-from engage_hri.services.client.feeds import Feed
+from engage_hri.services.client.feeds import Feed, first_of
 from engage_hri.services.client.inputs import (
     checked,
     taken,
 )
-from engage_hri.services.client.results import in_time
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
 
 
@@ -228,8 +226,7 @@ class OrderedRobot:
         Raises:
             NoReply: none within `timeout`.
         """
-        with self.body_faults() as feed:
-            return in_time(await feed.next(timeout), "state of the body", timeout).faults
+        return (await first_of(self.body_faults(), "state of the body", timeout)).faults
 
     async def capabilities(self, timeout: Seconds = 1.0) -> Capabilities:
         """Return what the body says of itself: its parts and joints, what it can do, which faults it can play.
@@ -274,8 +271,7 @@ class OrderedRobot:
         Raises:
             NoReply: none within `timeout`.
         """
-        with self.conditions() as feed:
-            return in_time(await feed.next(timeout), "condition of a study", timeout)
+        return await first_of(self.conditions(), "condition of a study", timeout)
 
     async def _ask(self, key: str, request: Request, timeout: Seconds | None) -> Outcome:
         taken(timeout, Seconds | None, "timeout")

@@ -11,34 +11,38 @@ It may start before the services it talks to: requests wait for them, at most `t
 import uuid
 from collections.abc import AsyncIterator, Collection, Iterable, Sequence
 from contextlib import asynccontextmanager
-from typing import get_args
+from typing import TypeVar, get_args
 
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.behaviors import BlockBehavior, Constraint, EventKind
 from engage_hri.schemas.blocks import (
     Block,
     BlockOutcome,
     Composition,
+    Feedback,
+    Held,
     PerformBlock,
 )
-from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import Feedback
-from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
-from engage_hri.schemas.holds import Held
-from engage_hri.schemas.perception import Utterance
-from engage_hri.schemas.presence import PeerGone
+from engage_hri.schemas.faults import Fault, RunFailed
+from engage_hri.schemas.fragments import (
+    FragmentOutcome,
+    HeadOwner,
+    HeardText,
+    PerformFragment,
+    TurnClosed,
+    TurnFragment,
+)
+from engage_hri.schemas.participants import PeerGone
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, Utterance
 from engage_hri.schemas.recognition import Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.config import Mode
 from engage_hri.services.bus.interface import Bus, Hub, Keep
 from engage_hri.services.client.event_stream import EventStream
-from engage_hri.services.client.feeds import ActionFeed, EventFeed, Feed, NewFeed
-from engage_hri.services.client.hearing import NewWords
+from engage_hri.services.client.feeds import ActionFeed, EventFeed, Feed, NewFeed, first_of
 from engage_hri.services.client.inputs import (
     BlockSource,
     FragmentSource,
@@ -50,12 +54,44 @@ from engage_hri.services.client.inputs import (
     taken,
 )
 from engage_hri.services.client.orders import OrderedRobot
-from engage_hri.services.client.results import in_time, successful
 from engage_hri.services.requests.ends import Pending, Requester
 from engage_hri.services.runtime.configuration import bus_config
 
 ANSWER_PATIENCE = 40.0
 """Seconds after a fragment's end for which `await_answer` waits: longer than an answer takes, and its words."""
+
+
+UTTERANCES_KEPT = 256
+"""Number of utterances of which a reader of outcomes is known to have been told."""
+
+
+class PerformFailed(RunFailed):
+    """A fragment or block failed while it ran, or what performed it has gone, so that its end is unknown.
+
+    `outcome` tells what was done of it, as far as is known, and its `status` which of the two; `fault` tells why.
+    """
+
+    def __init__(self, fault: Fault, outcome: FragmentOutcome | BlockOutcome) -> None:
+        super().__init__(fault)
+        self.outcome = outcome
+
+
+class NewWords:
+    """Words that one reader of outcomes has not been told yet: each outcome repeats those since the turn before."""
+
+    def __init__(self) -> None:
+        self._told: dict[tuple[str, str], str] = {}
+        """Text of each utterance, by person and id."""
+
+    def of(self, heard: Iterable[HeardText]) -> tuple[HeardText, ...]:
+        """Return those that are new, or say something else than before; from now on they are known."""
+        new = tuple(each for each in heard if self._told.get((each.actor, each.id)) != each.text)
+        for each in new:
+            self._told.pop((each.actor, each.id), None)
+            self._told[each.actor, each.id] = each.text
+        while len(self._told) > UTTERANCES_KEPT:
+            del self._told[next(iter(self._told))]
+        return new
 
 
 class Robot(OrderedRobot):
@@ -101,7 +137,7 @@ class Robot(OrderedRobot):
         fragment = pending.request.fragment
         awaits_answer = await_answer and fragment.turn_status in ("end", "full")
         outcome = await (self._answered(pending, timeout) if awaits_answer else self._performed(pending, timeout))
-        return successful(self._with_new_words(outcome), fragment.id)
+        return _successful(self._with_new_words(outcome), fragment.id)
 
     def _unnamed(self) -> str:
         """Make the id of a fragment or block that has none."""
@@ -170,7 +206,7 @@ class Robot(OrderedRobot):
         request = PerformBlock(id=self._request_id(made.id), block=made, follows=listed(follows, "follows"))
         outcome = await self._ask(keys.BLOCK, request, timeout)
         assert isinstance(outcome, BlockOutcome)
-        return successful(outcome, made.id)
+        return _successful(outcome, made.id)
 
     def connection_events(
         self, actor: str = "", kind: EventKind | Collection[EventKind] = (), *, open: bool = False
@@ -232,9 +268,7 @@ class Robot(OrderedRobot):
             InputRefused: `timeout` is no number.
             NoReply: no world within `timeout`.
         """
-        taken(timeout, Seconds | None, "timeout")
-        with self.worlds() as worlds:
-            return in_time(await worlds.next(timeout), "world", timeout)
+        return await first_of(self.worlds(), "world", timeout)
 
     async def person(self, timeout: Seconds | None = None) -> Entity:
         """Return the person who is there, or the first to come.
@@ -245,14 +279,8 @@ class Robot(OrderedRobot):
             InputRefused: `timeout` is no number.
             NoReply: nobody within `timeout`.
         """
-        taken(timeout, Seconds | None, "timeout")
-        deadline = None if timeout is None else self.now() + timeout
-        with self.worlds() as worlds:
-            while True:
-                left = None if deadline is None else max(0.0, deadline - self.now())
-                world = in_time(await worlds.next(left), "person in the world", timeout)
-                if world.people:
-                    return world.people[0]
+        world = await first_of(self.worlds(), "person in the world", timeout, lambda world: bool(world.people))
+        return world.people[0]
 
     def statistics_updates(self, actor: str = "") -> Feed[Statistics]:
         """Follow the statistics of a person, or of each and `all`: now, and at each change. Only the newest are kept.
@@ -276,9 +304,7 @@ class Robot(OrderedRobot):
             NoReply: none within `timeout`.
             ValueError: a name that can be no person.
         """
-        taken(timeout, Seconds | None, "timeout")
-        with self.statistics_updates(actor) as feed:
-            return in_time(await feed.next(timeout), f"statistics of {actor}", timeout)
+        return await first_of(self.statistics_updates(actor), f"statistics of {actor}", timeout)
 
     def actions(self) -> Feed[ActionBegan | ActionEnded | ActorFound | ActorLost]:
         """Follow the actions of the robot and of people as they are seen, and the coming and going of people.
@@ -296,6 +322,16 @@ class Robot(OrderedRobot):
     def _with_new_words(self, outcome: FragmentOutcome) -> FragmentOutcome:
         """Leave out of an outcome what this client has been told by an earlier one."""
         return replace(outcome, heard=self._words.of(outcome.heard))
+
+
+O = TypeVar("O", FragmentOutcome, BlockOutcome)  # noqa: E741
+
+
+def _successful(outcome: O, subject: str) -> O:
+    """Return the outcome, or raise PerformFailed if it says so. subject: id of the fragment or block."""
+    if outcome.status in ("failed", "unknown"):
+        raise PerformFailed(outcome.fault or Fault(reason="it failed", where=subject), outcome)
+    return outcome
 
 
 def _without_an_answer(outcome: FragmentOutcome) -> FragmentOutcome:

@@ -8,12 +8,10 @@ from collections.abc import AsyncIterator, Callable, Collection, Iterable
 from contextlib import asynccontextmanager
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.blocks import BodyHeld, Held, NetWaiting
 from engage_hri.schemas.body_faults import BodyFaults
-from engage_hri.schemas.conditions import StudyCondition
-from engage_hri.schemas.holds import BodyHeld, Held
+from engage_hri.schemas.fragments import HeadOwner, StudyCondition
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.nets import NetWaiting
 from engage_hri.schemas.recognition import ConnectionEvent, OpenEvents
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Received

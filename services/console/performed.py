@@ -1,7 +1,7 @@
 """Words for what the robot performs and no action tells of: gestures by name, faces, postures, turns of the head.
 
-Looks, pointings, nods and speech are seen as actions (schemas/actions.py), whoever asks for them. Of the others only
-those know the names who have the block.
+Looks, pointings, nods and speech are seen as actions (schemas/perception.py), whoever asks for them. Of the others
+only those know the names who have the block.
 """
 
 from collections.abc import Mapping

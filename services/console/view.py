@@ -4,25 +4,23 @@
 the bus.
 """
 
+from collections.abc import Mapping
+
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.blocks import BlockProgress, Held, Hold, WarningFeedback
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.body_faults import BodyFault, BodyFaults
-from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import BlockProgress, WarningFeedback
-from engage_hri.schemas.holds import Held, Hold
+from engage_hri.schemas.fragments import Claim, HeadOwner, StudyCondition
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import Utterance
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, Utterance
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
-from engage_hri.schemas.speakable import joined
+from engage_hri.schemas.text import joined
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.console.shelf import Shelf
 from engage_hri.services.reports.in_force import InForce
 
 UTTERANCES_KEPT = 160
@@ -93,7 +91,8 @@ class Scene(Struct, frozen=True, kw_only=True):
     robot: str
     began: Seconds
     now: Seconds
-    actors: Shelf[str, Actor] = Shelf()
+    actors: Mapping[str, Actor] = {}
+    """By id, in the order in which they came."""
     said: tuple[UtteranceInView, ...] = ()
     events: tuple[EventInView, ...] = ()
     owner: Claim | None = None
@@ -194,17 +193,17 @@ def _act(scene: Scene, message: ActionBegan | ActionEnded | ActorFound | ActorLo
             actor = Actor(id=actor.id)
         case ActorLost():
             return replace(scene, actors=_without(scene.actors, actor.id))
-    scene = replace(scene, actors=scene.actors.put(actor.id, actor))
+    scene = replace(scene, actors={**scene.actors, actor.id: actor})
     if isinstance(message, ActionBegan | ActionEnded) and message.action == "speak":
         return _voice(scene, message, at)
     return scene
 
 
-def _without(actors: Shelf[str, Actor], lost: str) -> Shelf[str, Actor]:
+def _without(actors: Mapping[str, Actor], lost: str) -> dict[str, Actor]:
     """The actors with this one gone, at the end, and without those that have been gone for longest."""
-    gone = [actor for actor in actors if not actor.present and actor.id != lost][1 - LOST_KEPT :]
-    here = [actor for actor in actors if actor.present and actor.id != lost]
-    return Shelf((each.id, each) for each in (*here, *gone, Actor(id=lost, present=False)))
+    gone = [actor for actor in actors.values() if not actor.present and actor.id != lost][1 - LOST_KEPT :]
+    here = [actor for actor in actors.values() if actor.present and actor.id != lost]
+    return {each.id: each for each in (*here, *gone, Actor(id=lost, present=False))}
 
 
 def _voice(scene: Scene, message: ActionBegan | ActionEnded, at: Seconds) -> Scene:

@@ -2,10 +2,9 @@
 
 from collections.abc import Sequence
 
-from engage_hri.schemas.attention import Claim
 from engage_hri.schemas.behaviors import Action, EventKind
-from engage_hri.schemas.feedback import WarningFeedback
-from engage_hri.schemas.holds import Hold
+from engage_hri.schemas.blocks import Hold, WarningFeedback
+from engage_hri.schemas.fragments import Claim
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 

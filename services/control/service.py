@@ -13,11 +13,11 @@ from msgspec import Struct
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.body_faults import BodyFault, SwitchFaults
-from engage_hri.schemas.covered import COVERED_FOR
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.requests import Request
 from engage_hri.schemas.units import Seconds
-from engage_hri.schemas.world import World
+from engage_hri.schemas.world import COVERED_FOR, World
+from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import Bus, Received, is_asked_to_stop
 from engage_hri.services.control.bases.drivers import made, with_settings_of_drivers
 from engage_hri.services.control.config import ControlConfig
@@ -33,10 +33,9 @@ from engage_hri.services.control.contract.calibration import calibrated
 from engage_hri.services.control.contract.refusals import VOICE_ADVICE
 from engage_hri.services.control.serving import effects, steps
 from engage_hri.services.control.serving.intake import ControlIntake
-from engage_hri.services.control.serving.progress_check import sound
+from engage_hri.services.control.serving.live_behavior import sound
 from engage_hri.services.control.serving.questions import Questions
 from engage_hri.services.control.serving.state_publisher import Shown
-from engage_hri.services.control.serving.warnings_told import recovered, warn
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.alarm import Timer
 from engage_hri.services.runtime.intake import AnswerRequest, PublishMessage, input_of
@@ -129,9 +128,9 @@ class _Control:
         self._looking_at = ""
         """What the eyes rest on, as the intake was told."""
         body.on_fault = lambda fault: self._take(steps.BodyComplained(fault))
-        body.on_recovery = partial(recovered, bus)
+        body.on_recovery = self._reassure
         calibration = calibrated(body, config.calibration)
-        self.questions = Questions(bus, config, body, calibration, self._intake)
+        self.questions = Questions(config, body, calibration, self._intake, self._warn)
         self._shown = Shown(bus, body, config.state_rate, self._note_eyes, calibration)
 
     def begin(self, covered_for: Seconds) -> None:
@@ -192,9 +191,9 @@ class _Control:
             case AnswerRequest(answer=answer):
                 self.desk.answer(answer)
             case effects.Alert(fault=fault):
-                warn(self._bus, fault)
+                self._warn(fault)
             case effects.Reassure(text=text):
-                recovered(self._bus, text)
+                self._reassure(text)
             case effects.ShowWorld(world=world):
                 self._body.see(world)
                 self._look()
@@ -224,6 +223,15 @@ class _Control:
                 self._shown.look_soon()
             case effects.StopHome(request=id):
                 self._homeward[id].cancel()
+
+    def _warn(self, fault: Fault) -> None:
+        """Tell of something that a person has to see to: on the bus, in the log, and from the command that serves."""
+        journal.alert(self._bus.log, "control: %s", fault)
+        self._bus.publish(keys.fault("control"), fault)
+
+    def _reassure(self, text: str) -> None:
+        """Tell whoever sees the log that something is over of which it was warned."""
+        journal.alert(self._bus.log, "control: %s", text)
 
     # -- what the body does -------------------------------------------------------------------------------------
 

@@ -6,7 +6,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.keys import Part
-from engage_hri.schemas.status import ClockOffset, ProcessFacts, Status
+from engage_hri.schemas.participants import ClockOffset, ProcessFacts, Status
 from engage_hri.schemas.units import Seconds
 
 

@@ -6,7 +6,7 @@ from typing import Literal
 from msgspec import Struct
 
 from engage_hri.schemas import access, keys
-from engage_hri.schemas.status import ClockOffset, Status
+from engage_hri.schemas.participants import ClockOffset, Status
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.doctor.facts import SystemFacts
 

@@ -22,7 +22,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.access import PARTICIPANTS, ROUTER, Holder, role_of
 from engage_hri.schemas.body import Capabilities, DescribeBody
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
-from engage_hri.schemas.status import AskStatus, ProcessFacts, Status
+from engage_hri.schemas.participants import AskStatus, ProcessFacts, Status
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.config import ENDPOINT, BusConfig, is_encrypted, is_on_this_machine

@@ -16,8 +16,8 @@ from engage_hri.schemas.behaviors import Behavior, Event, FragmentBehavior, Refe
 from engage_hri.schemas.blocks import BlockOutcome, SpokenText
 from engage_hri.schemas.fragments import ReferenceChoice, ReferenceMade, TurnFragment
 from engage_hri.schemas.recognition import ConnectionEvent
-from engage_hri.schemas.speakable import has_words
-from engage_hri.schemas.syncref import SyncRef
+from engage_hri.schemas.references import SyncRef
+from engage_hri.schemas.text import has_words
 from engage_hri.services.generation.block.emission import FragmentPlan
 from engage_hri.services.generation.block.parts import Made
 from engage_hri.services.generation.turns.policy import TurnPlan

@@ -5,8 +5,16 @@ from typing import Literal
 
 from msgspec import Struct
 
-from engage_hri.schemas.ranges import inner_shares, not_negative, positive
-from engage_hri.schemas.units import Degrees, Meters, Probability, Radians, Seconds
+from engage_hri.schemas.units import (
+    Degrees,
+    Meters,
+    Probability,
+    Radians,
+    Seconds,
+    inner_shares,
+    not_negative,
+    positive,
+)
 
 Channel = Literal["sum", "independent"]
 Profile = Literal["check-back", "figure-3.3"]

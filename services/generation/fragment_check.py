@@ -8,13 +8,13 @@ from contextlib import contextmanager
 
 from msgspec.structs import replace
 
+from engage_hri.schemas.advice import suggestion
 from engage_hri.schemas.behaviors import Reference
 from engage_hri.schemas.check import validated
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.suggestion import suggestion
-from engage_hri.schemas.syncref import SyncRef
-from engage_hri.schemas.tool_call import in_call
+from engage_hri.schemas.references import SyncRef
+from engage_hri.schemas.tool import in_call
 from engage_hri.schemas.world import World
 from engage_hri.services.generation.lost import bearable, left_unsaid
 from engage_hri.services.generation.names import known, names, spelled, unknown

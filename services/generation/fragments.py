@@ -13,15 +13,19 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import GazeShift, TurnSignal
-from engage_hri.schemas.blocks import BlockOutcome, InterruptBehavior, PerformBlock
+from engage_hri.schemas.blocks import (
+    BlockOutcome,
+    InterruptBehavior,
+    PerformBlock,
+    SyncPointProgress,
+    WarningFeedback,
+)
 from engage_hri.schemas.body import AbortBehavior, WordSpoken
 from engage_hri.schemas.faults import EngageError, Fault, RequestRefused, RunFailed, bug
-from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import PerformFragment
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import Utterance
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, Utterance
 from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
 from engage_hri.schemas.requests import Accepted, Heard, Refused
 from engage_hri.schemas.units import Seconds, Stamp

@@ -16,21 +16,24 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
-from engage_hri.schemas.attention import HeadOwner, Inhibit, InhibitionEnded
-from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
+from engage_hri.schemas.blocks import BlockOutcome, PerformBlock, SyncPointProgress, WarningFeedback, WarningKind
 from engage_hri.schemas.body import RobotState, WordSpoken
-from engage_hri.schemas.conditions import ConditionSet, SetCondition, StudyCondition
-from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
-from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback, WarningKind
-from engage_hri.schemas.fragments import PerformFragment
-from engage_hri.schemas.perception import Utterance
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.fragments import (
+    ConditionSet,
+    HeadOwner,
+    Inhibit,
+    InhibitionEnded,
+    PerformFragment,
+    SetCondition,
+    StudyCondition,
+)
+from engage_hri.schemas.participants import PeerAlive, PeerGone
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions, Utterance
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, session_of
 from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused, Unreadable, kind_of
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.schemas.world import World
+from engage_hri.schemas.world import COVERED_FOR, CoveredObjects, World
 from engage_hri.services.bus.sight import Sight
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.exchange import NAME, AnswerCame, GenerationBegan, OwnSight, SendRequest

@@ -10,10 +10,10 @@ from string import ascii_letters, digits
 
 from msgspec.structs import replace
 
+from engage_hri.schemas.advice import meant
 from engage_hri.schemas.behaviors import FragmentBehavior, Reference, Speech, Wait
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import rewritten
-from engage_hri.schemas.suggestion import meant
 from engage_hri.schemas.world import World
 from engage_hri.services.generation.names import Aimed, Ids, Kind, known, spelled, unknown
 from engage_hri.services.generation.references.phrases import noun_in

@@ -5,6 +5,7 @@ from typing import Literal, NamedTuple
 
 from msgspec.structs import replace
 
+from engage_hri.schemas.advice import in_other_letters
 from engage_hri.schemas.behaviors import (
     FragmentBehavior,
     Gaze,
@@ -15,7 +16,6 @@ from engage_hri.schemas.behaviors import (
     SpeechOption,
 )
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.suggestion import in_other_letters
 from engage_hri.schemas.world import World
 from engage_hri.services.text.pieces import Piece, problems
 

@@ -17,12 +17,11 @@ from engage_hri.schemas.behaviors import (
     Speech,
     TurnSignal,
 )
-from engage_hri.schemas.blocks import BlockOutcome
+from engage_hri.schemas.blocks import BlockOutcome, SyncPointProgress
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.faults import EngageError, Fault, OutcomeUnknown
-from engage_hri.schemas.feedback import SyncPointProgress
 from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, ReferenceChoice, TurnFragment
-from engage_hri.schemas.speakable import has_words
+from engage_hri.schemas.text import has_words
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.generation.acts import (

@@ -11,12 +11,12 @@ from msgspec import Struct
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import PerformBlock
 from engage_hri.schemas.body import DescribeBody
-from engage_hri.schemas.covered import COVERED_FOR
 from engage_hri.schemas.faults import EngageError, RunFailed
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import session_of
 from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import COVERED_FOR
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.exchange import (

@@ -2,8 +2,7 @@
 
 from msgspec import Struct
 
-from engage_hri.schemas.ranges import not_negative
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Seconds, not_negative
 
 LATE: Seconds = 0.5
 """Time by which a phase may take longer than natural before the realizer warns. Ours."""

@@ -11,7 +11,7 @@ from lxml import etree
 from msgspec.structs import asdict
 
 from engage_hri.schemas.behaviors import Event, Speech
-from engage_hri.schemas.nets import Fired, NetPlace, NetPlanned, NetPoint, NetSpeech, NetTransition
+from engage_hri.schemas.blocks import Fired, NetPlace, NetPlanned, NetPoint, NetSpeech, NetTransition
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.realizer.net.petri_net import Bound, Marking, PetriNet, Place, is_live, is_safe
 from engage_hri.services.realizer.plan.plan import Plan

@@ -13,19 +13,21 @@ from msgspec.structs import replace
 from engage_hri.schemas import keys
 from engage_hri.schemas.behavior_types import dialect_sync
 from engage_hri.schemas.behaviors import BlockBehavior, Speech
-from engage_hri.schemas.blocks import Block, BlockOutcome, SpokenText
-from engage_hri.schemas.body import BehaviorOutcome
-from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import (
+from engage_hri.schemas.blocks import (
+    Block,
+    BlockOutcome,
     BlockProgress,
     Feedback,
     PlannedPoint,
     PredictionFeedback,
+    SpokenText,
     SyncPointProgress,
     WarningFeedback,
     WarningKind,
 )
-from engage_hri.schemas.speakable import has_words
+from engage_hri.schemas.body import BehaviorOutcome
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.text import has_words
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.decide.decisions import Decisions

@@ -14,6 +14,7 @@ from engage_hri.schemas.blocks import (
     PerformBlock,
     SteerPerformance,
     SteerRobot,
+    WarningFeedback,
 )
 from engage_hri.schemas.body import (
     GoHome,
@@ -22,8 +23,7 @@ from engage_hri.schemas.body import (
     WordSpoken,
 )
 from engage_hri.schemas.faults import EngageError, Fault
-from engage_hri.schemas.feedback import WarningFeedback
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.references import disambiguated
 from engage_hri.schemas.requests import Cancel, Outcome, Request, Unreadable
 from engage_hri.schemas.units import Seconds

@@ -4,8 +4,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from engage_hri.schemas.ranges import positive
-from engage_hri.schemas.units import Degrees, Probability, Seconds
+from engage_hri.schemas.units import Degrees, Probability, Seconds, positive
 
 GazeResolution = Literal["object", "table"]
 

@@ -13,13 +13,21 @@ from math import inf, isnan
 from typing import TypeGuard, get_args
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
-from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.blocks import BlockProgress, SyncPointProgress
 from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
-from engage_hri.schemas.perception import HeadPose, Utterance, VoiceActivity
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.fragments import HeadOwner
+from engage_hri.schemas.participants import PeerAlive, PeerGone
+from engage_hri.schemas.perception import (
+    ActionBegan,
+    ActionEnded,
+    ActorFound,
+    ActorLost,
+    HeadPose,
+    OngoingActions,
+    Utterance,
+    VoiceActivity,
+)
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, TurnOutcome
 from engage_hri.schemas.requests import Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds, Stamp

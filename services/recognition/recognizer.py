@@ -11,9 +11,8 @@ from collections.abc import Callable
 from functools import partial
 from itertools import count
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.body import RobotState
-from engage_hri.schemas.perception import HeadPose, VoiceActivity
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose, VoiceActivity
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig

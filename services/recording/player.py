@@ -12,7 +12,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.samples import Received, Sample
 from engage_hri.services.recording.reading import Recording, received

@@ -11,7 +11,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.access import PARTICIPANTS
 from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Hub, Received, Sample, Subscription
 from engage_hri.services.recording.player import Playback, readable

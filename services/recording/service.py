@@ -11,7 +11,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.body import DescribeBody
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.messages import Message, encode, encoding_of
-from engage_hri.schemas.status import AskStatus
+from engage_hri.schemas.participants import AskStatus
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Sample, Tap
 from engage_hri.services.recording.disk import FULL_CHUNK, RecordingFile, Tell

@@ -10,7 +10,7 @@ from msgspec import Struct
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.settings import ServiceSettings, sections
+from engage_hri.schemas.participants import ServiceSettings, sections
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recording.reading import Recording
 

@@ -7,14 +7,12 @@ it, or when the program that told of it has gone for good.
 from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
-from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.blocks import BlockProgress, SyncPointProgress
 from engage_hri.schemas.body import WordSpoken
-from engage_hri.schemas.conditions import StudyCondition
-from engage_hri.schemas.conditions import words as condition
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
-from engage_hri.schemas.perception import Utterance
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.fragments import HeadOwner, StudyCondition
+from engage_hri.schemas.fragments import condition_words as condition
+from engage_hri.schemas.participants import PeerAlive, PeerGone
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions, Utterance
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, OpenEvents
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.samples import Received

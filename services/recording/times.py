@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
-from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.fragments import HeadOwner
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.samples import Received
 from engage_hri.services.recording.losses import CLOCK

@@ -20,8 +20,8 @@ from typing import Literal, NamedTuple
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.reports.ongoing_actions import MOST, ActionEvent, GoesOn, Report, TimedReport
 

@@ -9,9 +9,9 @@ from typing import Self
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.conditions import StudyCondition
+from engage_hri.schemas.fragments import StudyCondition
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 

@@ -28,7 +28,7 @@ from engage_hri.schemas.faults import (
     ServerRestarted,
 )
 from engage_hri.schemas.messages import COMMANDS, Message
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.requests import (
     Accepted,
     Answer,

@@ -16,7 +16,7 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.ledger import Step, Taken
+from engage_hri.schemas.participants import Step, Taken
 from engage_hri.services.bus.samples import Received
 from engage_hri.services.runtime.intake import Input, ServiceIntake
 from engage_hri.services.runtime.ledger import StepClock, fingerprint

@@ -9,9 +9,9 @@ from typing import Any, TypeVar
 import msgspec
 from msgspec import Struct
 
-from engage_hri.schemas.explained import explained
+from engage_hri.schemas.advice import explained
 from engage_hri.schemas.faults import Fault, InputRefused, NotReady
-from engage_hri.schemas.utf8 import is_utf8, utf8
+from engage_hri.schemas.text import is_utf8, utf8
 from engage_hri.services.bus.config import BusConfig, environment
 
 FILE = "ENGAGE_CONFIG"

@@ -9,7 +9,7 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.ledger import ReadClock, Step, Taken
+from engage_hri.schemas.participants import ReadClock, Step, Taken
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.runtime.intake import Input
 

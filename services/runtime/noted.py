@@ -8,7 +8,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.ledger import ReadClock, Step
+from engage_hri.schemas.participants import ReadClock, Step
 from engage_hri.schemas.recognition import session_of
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Received

@@ -15,8 +15,7 @@ from typing import Any
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused, NotReady
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.presence import PeerAlive
-from engage_hri.schemas.status import AskStatus, Status
+from engage_hri.schemas.participants import AskStatus, PeerAlive, Status
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import Bus, Hub, Subscription

@@ -9,7 +9,7 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.settings import ServiceSettings, SettingsFile, text_of
+from engage_hri.schemas.participants import ServiceSettings, SettingsFile, text_of
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.runtime.service import installed_version
 

@@ -5,8 +5,8 @@ Pure. This person is for first meetings: it knows no task but that of which it i
 
 from collections.abc import Callable
 
-from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.simulation.hearing import THINKING, HeardSpeech
 from engage_hri.services.simulation.human import FACE, Act, Lay, LookAt, Pause, Start, Stop

@@ -4,11 +4,11 @@ import re
 
 from msgspec import Struct
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.blocks import BlockProgress
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.body_faults import BodyFaults
-from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import ActionBegan, ActionEnded
 
 THINKING = "ummmm"
 """Words of a robot that will go on speaking: they need no answer."""

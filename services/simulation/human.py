@@ -13,12 +13,12 @@ from itertools import count
 
 from msgspec import Struct
 
-from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.behaviors import Action, EventKind
+from engage_hri.schemas.blocks import BlockProgress
 from engage_hri.schemas.body import WordSpoken
-from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.schemas.footprints import Side
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.recognition import ConnectionEvent, EventState
 from engage_hri.schemas.units import Seconds
 

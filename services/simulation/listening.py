@@ -5,8 +5,8 @@ Pure. Meant for managers without a plan that is known beforehand.
 
 from collections.abc import Callable
 
-from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.simulation.hearing import HeardSpeech, Hearing
 from engage_hri.services.simulation.human import (

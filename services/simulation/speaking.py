@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.client.people.utterances import RECOGNIZING, Utterances, speaking_time
+from engage_hri.services.client.people.actions import RECOGNIZING, Utterances, speaking_time
 from engage_hri.services.simulation.human import Act, Pause, Start, Stop, Understood
 
 

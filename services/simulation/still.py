@@ -9,15 +9,14 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActorFound
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.perception import Utterance
+from engage_hri.schemas.perception import ActorFound, Utterance
+from engage_hri.schemas.text import utf8
 from engage_hri.schemas.units import FARTHEST, Stamp
-from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.client.people.perceived_actions import PerceivedActions
-from engage_hri.services.client.people.person_actions import PersonActions
+from engage_hri.services.client.people.actions import PersonActions
+from engage_hri.services.client.people.perceived_person import PerceivedActions
 from engage_hri.services.client.people.shared_world import SharedWorld
 from engage_hri.services.reports.ongoing_actions import ActionEvent
 from engage_hri.services.runtime.service import Ready

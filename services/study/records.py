@@ -5,9 +5,9 @@ from typing import Literal
 
 from msgspec import Struct
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.behaviors import Cause, EventKind
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, KindStatistics, Statistics, WindowStatistics
 from engage_hri.schemas.units import Probability, Seconds
 

@@ -11,7 +11,7 @@ docs/decisions/0080 says why it is no library.
 import re
 from typing import Literal, NamedTuple
 
-from engage_hri.schemas.speakable import UNSPACED
+from engage_hri.schemas.text import UNSPACED
 from engage_hri.services.text.abbreviations import BEFORE_A_NUMBER, BEFORE_A_WORD, BEFORE_EITHER, ORDINAL_AFTER
 
 CLOSING = "\"'”’“‘»)\\]"

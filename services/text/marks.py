@@ -21,7 +21,7 @@ from unicodedata import category
 import regex
 from msgspec import Struct
 
-from engage_hri.schemas.suggestion import in_other_letters, meant
+from engage_hri.schemas.advice import in_other_letters, meant
 from engage_hri.services.text import patterns as mark
 from engage_hri.services.text.acts import LISTS
 from engage_hri.services.text.pieces import Ids, Kind, Piece, Reason

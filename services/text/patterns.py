@@ -5,7 +5,7 @@ Each is to end with something that shows its end, so that a text which still com
 
 import unicodedata
 
-from engage_hri.schemas.speakable import UNSPACED
+from engage_hri.schemas.text import UNSPACED
 from engage_hri.services.text.acts import IN_ASTERISKS, IN_BRACKETS, IN_PARENTHESES
 
 THOUGHTS = frozenset({"think", "thinking", "thought", "thoughts", "reasoning", "reflection", "scratchpad"})

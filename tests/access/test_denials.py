@@ -2,7 +2,7 @@
 
 import pytest
 
-from engage_hri.schemas.limits import MOST_MESSAGES, MOST_PULSES, MOST_QUESTIONS
+from engage_hri.schemas.access import MOST_MESSAGES, MOST_PULSES, MOST_QUESTIONS
 from engage_hri.services.bus.zenoh.denials import LONGEST, MOST, Denials
 
 TRACE = "\x1b[2m2026-11-22T22:21:26.150311Z\x1b[0m \x1b[35mTRACE\x1b[0m  rx-0 ThreadId({}) \x1b[2mzenoh::net::routing::interceptor::access_control\x1b[0m: {}"  # noqa: E501

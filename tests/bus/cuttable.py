@@ -4,7 +4,7 @@ import random
 from itertools import combinations
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.units import Probability
 from engage_hri.services.bus.interface import Received, Subscription
 from engage_hri.services.bus.memory import MemoryBus, MemoryHub, Past

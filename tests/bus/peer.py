@@ -6,9 +6,8 @@ import sys
 import threading
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.blocks import Block, BlockOutcome, BlockProgress, PerformBlock
 from engage_hri.schemas.faults import EngageError
-from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.schemas.requests import Cancel
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.zenoh.hub import open_hub

@@ -9,7 +9,7 @@ import zenoh
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.messages import Message, encode
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.services.bus.interface import Keep, Received, Subscription
 from engage_hri.services.bus.zenoh import session
 from engage_hri.services.bus.zenoh.hub import open_hub

@@ -6,9 +6,9 @@ import threading
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.faults import NoReply
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.fragments import Claim, HeadOwner
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Accepted
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Keep

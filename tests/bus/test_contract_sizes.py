@@ -5,8 +5,8 @@ import logging
 import pytest
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.access import LONGEST_ENCODING, LONGEST_KEY, check_size, most
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.limits import LONGEST_ENCODING, LONGEST_KEY, check_size, most
 from engage_hri.schemas.messages import Message, published
 from engage_hri.schemas.requests import Accepted
 from engage_hri.services.bus.zenoh.hub import ZenohHub

@@ -4,7 +4,7 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.messages import decode, published
-from engage_hri.schemas.presence import PeerAlive
+from engage_hri.schemas.participants import PeerAlive
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Bus, Sample, Tap
 from tests.bus.places import PATIENCE, Place, state

@@ -9,7 +9,7 @@ import pytest_asyncio
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
 from engage_hri.services.requests.ends import RequestDesk, Requester
 from tests.bus.cable import Cable

@@ -13,9 +13,9 @@ import zenoh
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.messages import decode, encode, encode_json
+from engage_hri.schemas.participants import AskStatus
 from engage_hri.schemas.recognition import OpenEvents
 from engage_hri.schemas.requests import Accepted
-from engage_hri.schemas.status import AskStatus
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.zenoh import readers
 from engage_hri.services.bus.zenoh import session as zenoh_session

@@ -6,15 +6,13 @@ import msgspec
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActorLost
-from engage_hri.schemas.blocks import Block, PerformBlock
+from engage_hri.schemas.blocks import Block, BlockProgress, BodyHeld, Held, Hold, PerformBlock, WarningFeedback
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import BlockProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
-from engage_hri.schemas.holds import BodyHeld, Held, Hold
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
+from engage_hri.schemas.perception import ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.requests import Refused
 from engage_hri.schemas.units import Stamp

@@ -6,7 +6,7 @@ import logging
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.status import BusHealth, ProcessFacts, Reachable, Status
+from engage_hri.schemas.participants import BusHealth, ProcessFacts, Reachable, Status
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.zenoh import neighbors
 from engage_hri.services.bus.zenoh.hub import open_hub

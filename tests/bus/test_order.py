@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.limits import BESIDE, SMALL
+from engage_hri.schemas.access import BESIDE, SMALL
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.zenoh.order import PULSE_FOR, Envelope, Follower, Past, SentLog, Written, fitting
 from tests.random_cases import share_of

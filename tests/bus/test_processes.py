@@ -14,7 +14,7 @@ import pytest_asyncio
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.faults import RunFailed
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.services.bus.zenoh import hub as hub_module
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
 from engage_hri.services.bus.zenoh.session import PEER_AFAR

@@ -16,8 +16,7 @@ import pytest_asyncio
 import zenoh
 
 from engage_hri.schemas import access, keys
-from engage_hri.schemas.access import OWN, Holder
-from engage_hri.schemas.limits import BESIDE, LARGEST, MOST_PULSES, most
+from engage_hri.schemas.access import BESIDE, LARGEST, MOST_PULSES, OWN, Holder, most
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.bus.zenoh.router import routing
 from engage_hri.services.bus.zenoh.session import open_router

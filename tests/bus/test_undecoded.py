@@ -9,11 +9,10 @@ from msgspec import Struct
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gesture, Speech, Timing
-from engage_hri.schemas.blocks import Block, PerformBlock
-from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
+from engage_hri.schemas.blocks import Block, PerformBlock, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.messages import Message, published
-from engage_hri.schemas.status import AskStatus
+from engage_hri.schemas.participants import AskStatus
 from engage_hri.services.bus.interface import Received, Sample
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import connect

@@ -7,7 +7,7 @@ from contextlib import suppress
 import pytest
 import zenoh
 
-from engage_hri.schemas.limits import LOUD, LOUD_ROBOT
+from engage_hri.schemas.access import LOUD, LOUD_ROBOT
 from engage_hri.services.bus.zenoh import volume
 from engage_hri.services.bus.zenoh.router import routing
 from engage_hri.services.bus.zenoh.session import open_session

@@ -5,7 +5,7 @@ from typing import Any
 import msgspec
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.status import BusHealth, ClockOffset, ProcessFacts, Reachable, Status
+from engage_hri.schemas.participants import BusHealth, ClockOffset, ProcessFacts, Reachable, Status
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.doctor.facts import (
     BodyFacts,

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.status import ClockOffset
+from engage_hri.schemas.participants import ClockOffset
 from engage_hri.services.doctor.facts import (
     BodyFacts,
     Certificate,

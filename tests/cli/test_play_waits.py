@@ -10,7 +10,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gaze, Speech
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.presence import PeerAlive
+from engage_hri.schemas.participants import PeerAlive
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub

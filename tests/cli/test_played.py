@@ -5,8 +5,7 @@ import asyncio
 import pytest
 
 from engage_hri.schemas.behaviors import Event, EventKind
-from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.feedback import SyncPointProgress
+from engage_hri.schemas.blocks import Block, SyncPointProgress
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.recognition import ConnectionEvent, EventState
 from engage_hri.schemas.units import Seconds, Stamp

@@ -10,8 +10,7 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.ledger import Taken
-from engage_hri.schemas.settings import ServiceSettings, text_of
+from engage_hri.schemas.participants import ServiceSettings, Taken, text_of
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Sample
 from engage_hri.services.bus.zenoh.hub import open_hub

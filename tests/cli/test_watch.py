@@ -14,9 +14,9 @@ from typing import Any, NamedTuple, get_args
 
 import pytest
 
-from engage_hri.schemas import keys, lines
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
-from engage_hri.schemas.nets import Fired, NetMarked, NetPlace, NetPlanned, NetPoint, NetTransition
+from engage_hri.schemas import keys, messages
+from engage_hri.schemas.blocks import Fired, NetMarked, NetPlace, NetPlanned, NetPoint, NetTransition
+from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.zenoh.hub import open_hub
@@ -84,7 +84,7 @@ async def heard(events: EventFeed, state: str) -> ConnectionEvent:
 def parsed(text: str) -> Any:
     """The line, which has exactly the keys of its message."""
     made = json.loads(text)
-    (kind,) = (each for each in get_args(lines.LineMessage) if each.__struct_config__.tag == made["type"])
+    (kind,) = (each for each in get_args(messages.LineMessage) if each.__struct_config__.tag == made["type"])
     assert list(made) == ["type", *kind.__struct_fields__]
     return made
 

@@ -104,7 +104,7 @@ def test_the_log_tells_words_when_they_are_understood_and_events_once() -> None:
 
 
 def test_the_view_puts_words_where_they_were_said() -> None:
-    from engage_hri.schemas.actions import ActionBegan, ActionEnded
+    from engage_hri.schemas.perception import ActionBegan, ActionEnded
 
     scene = empty("robot", 0.0)
     for seconds, message in (

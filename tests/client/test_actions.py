@@ -2,7 +2,7 @@
 
 import asyncio
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.feeds import Feed

@@ -10,7 +10,6 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.attention import Inhibit, InhibitionEnded
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.blocks import (
     BehaviorInterrupted,
@@ -20,15 +19,21 @@ from engage_hri.schemas.blocks import (
     PerformBlock,
 )
 from engage_hri.schemas.faults import Fault, InputRefused, NoReply, RunFailed
-from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
+from engage_hri.schemas.fragments import (
+    FragmentOutcome,
+    Inhibit,
+    InhibitionEnded,
+    PerformFragment,
+    TurnClosed,
+    TurnFragment,
+)
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
 from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.units import Stamp
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.results import PerformFailed
-from engage_hri.services.client.robot import ANSWER_PATIENCE, connect
+from engage_hri.services.client.robot import ANSWER_PATIENCE, PerformFailed, connect
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.service import Ready, running
 

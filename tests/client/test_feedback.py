@@ -2,7 +2,7 @@
 
 import asyncio
 
-from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.schemas.blocks import BlockProgress
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import Robot, connect

@@ -10,9 +10,8 @@ from pathlib import Path
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import Utterance
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, Utterance
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.zenoh.hub import open_hub

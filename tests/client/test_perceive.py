@@ -11,17 +11,24 @@ from typing import Any
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.faults import InputRefused, RunFailed
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import LONGEST_TEXT, Utterance
+from engage_hri.schemas.perception import (
+    LONGEST_TEXT,
+    ActionBegan,
+    ActionEnded,
+    ActorFound,
+    ActorLost,
+    OngoingActions,
+    Utterance,
+)
 from engage_hri.schemas.units import Stamp
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.people.actions import WORD, speaking_time
 from engage_hri.services.client.people.perceive import perceive
 from engage_hri.services.client.people.perceived_person import BESIDE, SEAT, PerceivedPerson, free_seat
-from engage_hri.services.client.people.utterances import WORD, speaking_time
 from engage_hri.services.client.robot import connect
 from engage_hri.services.runtime.service import Ready, Service, running
 from engage_hri.services.simulation.still import show_world

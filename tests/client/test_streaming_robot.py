@@ -8,8 +8,7 @@ from typing import NamedTuple
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
-from engage_hri.schemas.perception import Utterance
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, Utterance
 from engage_hri.schemas.summary import Summary, summary
 from engage_hri.schemas.tool import Say, ToolInput
 from engage_hri.schemas.units import Seconds

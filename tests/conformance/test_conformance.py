@@ -12,12 +12,18 @@ from msgspec import Struct, field
 from engage_hri.schemas import keys
 from engage_hri.schemas.behavior_types import canonical_sync, dialect_sync, sync_points
 from engage_hri.schemas.behaviors import Event
-from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.blocks import (
+    Block,
+    BlockOutcome,
+    BlockProgress,
+    PerformBlock,
+    PredictionFeedback,
+    SyncPointProgress,
+    WarningFeedback,
+)
 from engage_hri.schemas.documents.json_codec import read
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
-from engage_hri.schemas.references import type_name
-from engage_hri.schemas.syncref import SyncRef
+from engage_hri.schemas.references import SyncRef, type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub

@@ -9,14 +9,13 @@ from hypothesis import strategies as st
 from msgspec import structs
 
 from engage_hri.schemas import behaviors as of
-from engage_hri.schemas.behavior_types import dialect_sync
+from engage_hri.schemas.behavior_types import SYNC_POINTS, dialect_sync
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.dialects import core, in_dialect
 from engage_hri.schemas.documents.json_codec import encode_json, read
 from engage_hri.schemas.documents.xml_decode import encode_xml
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.references import type_name
-from engage_hri.schemas.syncref import SYNC_POINTS, SyncRef
+from engage_hri.schemas.references import SyncRef, type_name
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from tests.conformance.case import Case, cases

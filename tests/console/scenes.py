@@ -3,11 +3,11 @@
 from collections.abc import Callable, Iterable
 from typing import TypeVar
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
-from engage_hri.schemas.attention import Claim, HeadOwner
+from engage_hri.schemas.blocks import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress
 from engage_hri.schemas.body import WordSpoken
-from engage_hri.schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress
+from engage_hri.schemas.fragments import Claim, HeadOwner
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
 from engage_hri.schemas.units import Seconds, Stamp
 

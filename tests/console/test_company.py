@@ -4,8 +4,8 @@ import asyncio
 
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.people.perceive import perceive
-from engage_hri.services.console.web.company import invitation
 from engage_hri.services.console.web.script import Script
+from engage_hri.services.console.web.seats import invitation
 from engage_hri.services.console.web.service import window
 from engage_hri.services.runtime.service import running
 from tests.console.test_seats import idle

@@ -1,7 +1,7 @@
 """The condition of a study in the window and in the log."""
 
-from engage_hri.schemas.conditions import StudyCondition
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.fragments import StudyCondition
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.services.console.terminal.log import Telling, line
 from engage_hri.services.console.view import empty, feed
 from tests.console.scenes import at

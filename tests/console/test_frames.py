@@ -3,13 +3,12 @@
 import json
 from typing import Any
 
-from engage_hri.schemas.attention import Claim, HeadOwner
-from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.schemas.blocks import BlockProgress
+from engage_hri.schemas.fragments import Claim, HeadOwner
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.console.web.frames import HEARTBEAT, Viewer, You
+from engage_hri.services.console.web.frames import HEARTBEAT, Receipts, Viewer, You
 from engage_hri.services.console.web.lanes import KEPT
 from engage_hri.services.console.web.picture import BLOCK, SECTIONS, Picture
-from engage_hri.services.console.web.receipts import Receipts
 from tests.console.scenes import at
 from tests.console.test_picture import RUN, picture
 

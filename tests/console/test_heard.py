@@ -5,15 +5,14 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActorFound, OngoingActions
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.presence import PeerGone
+from engage_hri.schemas.participants import PeerGone
+from engage_hri.schemas.perception import ActionBegan, ActorFound, OngoingActions
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.people.perceived_actions import PerceivedActions
-from engage_hri.services.client.people.perceived_person import PerceivedPerson
+from engage_hri.services.client.people.perceived_person import PerceivedActions, PerceivedPerson
 from engage_hri.services.console.follow import following
 from engage_hri.services.console.web.picture import Picture
 from engage_hri.services.console.web.service import PATTERNS

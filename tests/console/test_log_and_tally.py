@@ -5,10 +5,9 @@ import pytest
 from msgspec.structs import replace
 from rich.console import Console
 
+from engage_hri.schemas.blocks import BodyHeld, Held, Hold, WarningFeedback
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome
-from engage_hri.schemas.holds import BodyHeld, Held, Hold
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import Statistics, WindowStatistics
 from engage_hri.schemas.units import Seconds

@@ -2,7 +2,7 @@
 
 import pytest
 
-from engage_hri.schemas.attention import Claim, ClaimKind
+from engage_hri.schemas.fragments import Claim, ClaimKind
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.console.web.looking import plainly
 

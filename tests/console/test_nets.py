@@ -9,12 +9,11 @@ from msgspec.structs import replace
 from rich.cells import cell_len
 from rich.console import Console
 
-from engage_hri.schemas.nets import Fired, NetMarked, NetPlace, NetPlanned, NetPoint, NetTransition, NetWaiting
+from engage_hri.schemas.blocks import Fired, NetMarked, NetPlace, NetPlanned, NetPoint, NetTransition, NetWaiting
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.commandline.talk.net_drawing import drawing, legend
 from engage_hri.services.console import nets
-from engage_hri.services.console.net_layout import laid_out
-from engage_hri.services.console.nets import NetInView, feed, in_view, told, where
+from engage_hri.services.console.nets import NetInView, feed, in_view, laid_out, told, where
 from engage_hri.services.console.terminal.live import NetLog
 from tests.random_cases import share_of
 

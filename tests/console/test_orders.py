@@ -17,7 +17,6 @@ from engage_hri.schemas.footprints import edges, overlap, touches
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.tool import Say
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.console.web.laying import NEAR, laid
 from engage_hri.services.console.web.orders import (
     RIGHTS,
     AnyOrder,
@@ -31,6 +30,7 @@ from engage_hri.services.console.web.orders import (
     denied,
     written,
 )
+from engage_hri.services.console.web.scene import NEAR, laid
 from engage_hri.services.console.web.script import Script, backchannel, told
 from engage_hri.services.tangram.table import tangram_table
 

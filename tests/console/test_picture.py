@@ -5,18 +5,26 @@ from typing import Any
 
 import pytest
 
-from engage_hri.schemas.actions import ActionBegan, ActorFound, ActorLost
-from engage_hri.schemas.attention import Claim, HeadOwner
+from engage_hri.schemas.blocks import (
+    BlockProgress,
+    Fired,
+    NetMarked,
+    NetPlace,
+    NetPlanned,
+    NetPoint,
+    NetTransition,
+    NetWaiting,
+    PlannedPoint,
+    PredictionFeedback,
+    SyncPointProgress,
+)
 from engage_hri.schemas.body import BodyPose, Capabilities, JointAngle, Ray, RobotState
 from engage_hri.schemas.body_faults import BodyFault, BodyFaults
-from engage_hri.schemas.feedback import BlockProgress, PlannedPoint, PredictionFeedback, SyncPointProgress
-from engage_hri.schemas.fragments import FragmentOutcome, PairConsidered, ReferenceChoice
+from engage_hri.schemas.fragments import Claim, FragmentOutcome, HeadOwner, PairConsidered, ReferenceChoice
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.nets import Fired, NetMarked, NetPlace, NetPlanned, NetPoint, NetTransition, NetWaiting
-from engage_hri.schemas.perception import Utterance
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import BusHealth, PeerAlive, PeerGone, Status
+from engage_hri.schemas.perception import ActionBegan, ActorFound, ActorLost, Utterance
 from engage_hri.schemas.recognition import Statistics, WindowStatistics
-from engage_hri.schemas.status import BusHealth, Status
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.console import view

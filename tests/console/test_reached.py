@@ -5,7 +5,7 @@ import importlib.util
 
 import pytest
 
-from engage_hri.services.console.web.above import seen
+from engage_hri.services.console.web.scene import seen
 from tests.console.browser import Page
 from tests.console.test_window import Place, needs_browser, opened, press, sit
 from tests.console.test_window import place as place  # a fixture

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from engage_hri.services.console.web.receipts import MOST, Receipts
+from engage_hri.services.console.web.frames import NEWS_KEPT, Receipts
 
 
 @given(st.lists(st.integers(1, 9), max_size=60))
@@ -33,7 +33,7 @@ def test_news_are_in_every_frame_until_one_that_has_them_was_drawn(steps: list[s
 
 def test_a_page_that_draws_no_news_may_give_no_more_orders() -> None:
     receipts = Receipts()
-    for _ in range(MOST):
+    for _ in range(NEWS_KEPT):
         receipts.tell("part", "no")
 
     assert receipts.is_full

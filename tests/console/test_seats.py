@@ -10,12 +10,12 @@ from msgspec import Raw
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.console.web.frames import OrderNews, Receipts
 from engage_hri.services.console.web.orders import Given
-from engage_hri.services.console.web.receipts import OrderNews, Receipts
 from engage_hri.services.console.web.script import Script
 from engage_hri.services.console.web.seats import Seats
 from engage_hri.services.console.web.service import window

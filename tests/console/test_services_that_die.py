@@ -4,10 +4,10 @@ import asyncio
 
 import pytest
 
-from engage_hri.schemas.actions import ActionBegan
-from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.body import BodyPose, Ray, RobotState
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.fragments import Claim, HeadOwner
+from engage_hri.schemas.participants import PeerAlive, PeerGone
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.recognition import Statistics, WindowStatistics
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.console import view

@@ -2,15 +2,11 @@
 
 from typing import Literal
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
-from engage_hri.schemas.blocks import BlockOutcome, SpokenText
+from engage_hri.schemas.blocks import BlockOutcome, BlockProgress, Held, Hold, NetPlanned, NetSpeech, SpokenText
 from engage_hri.schemas.body import WordSpoken
-from engage_hri.schemas.feedback import BlockProgress
-from engage_hri.schemas.holds import Held, Hold
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.nets import NetPlanned, NetSpeech
-from engage_hri.schemas.perception import Utterance
-from engage_hri.schemas.presence import PeerGone
+from engage_hri.schemas.participants import PeerGone
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, Utterance
 from engage_hri.services.console.web.picture import Picture
 from engage_hri.services.console.web.sections import Left
 from engage_hri.services.console.web.sections import UtteranceShown as Turn

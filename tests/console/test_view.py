@@ -9,13 +9,14 @@ import pytest
 from msgspec.structs import replace
 from rich.console import Console
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.attention import Claim, HeadOwner
-from engage_hri.schemas.feedback import (
+from engage_hri.schemas.blocks import (
     BlockProgress,
+    Held,
+    Hold,
     WarningFeedback,
 )
-from engage_hri.schemas.holds import Held, Hold
+from engage_hri.schemas.fragments import Claim, HeadOwner
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.services.console import view
 from engage_hri.services.console.terminal import tally
 from engage_hri.services.console.terminal.log import Telling, line
@@ -270,7 +271,7 @@ def test_a_decision_costs_the_tally_no_look_at_all_events_of_the_session() -> No
             told = tally.feed(told, event(f"e{number}", "started", 0.0)[0], 0.0)
         decided = event("e7", "succeeded", 1.0)[0]
         count, told = instructions(tally.feed, told, decided)
-        assert [event.state for event in told.events][6:9] == ["started", "succeeded", "started"]
+        assert [event.state for event in told.events.values()][6:9] == ["started", "succeeded", "started"]
         return count
 
     assert work(1000) == work(10)

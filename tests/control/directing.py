@@ -6,9 +6,9 @@ from contextlib import asynccontextmanager
 from functools import partial
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.body import BehaviorOutcome, PerformBehavior, RobotState, SyncPointReached
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub

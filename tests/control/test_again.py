@@ -15,8 +15,8 @@ from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import AbortBehavior, BehaviorOutcome, GoHome, PerformBehavior
 from engage_hri.schemas.body_faults import BodyFault, SwitchFaults
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.ledger import Taken
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.participants import Taken
 from engage_hri.schemas.requests import Refused
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub

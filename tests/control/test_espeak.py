@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from engage_hri.schemas.behaviors import Mark, Speech
 from engage_hri.schemas.documents.prosody import Prosody, marked_up, spans
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.speakable import tokens
+from engage_hri.schemas.text import tokens
 from engage_hri.schemas.world import World
 from engage_hri.services.control.bases.composed import Member, composed
 from engage_hri.services.control.contract.body import Arrived, BodyFailed, MovementAuthority, Progress, Reached, Spoke

@@ -13,7 +13,7 @@ from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.service import embody
-from engage_hri.services.control.serving.estimates import flaw
+from engage_hri.services.control.serving.questions import flaw
 from engage_hri.services.control.testing import WORLD
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.runtime.service import running

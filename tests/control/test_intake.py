@@ -7,6 +7,7 @@ import pytest
 from msgspec import Struct
 
 from engage_hri.schemas.behaviors import Gaze, Wait
+from engage_hri.schemas.blocks import BodyHeld
 from engage_hri.schemas.body import (
     AbortBehavior,
     BehaviorAborted,
@@ -17,7 +18,6 @@ from engage_hri.schemas.body import (
     PerformBehavior,
 )
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.holds import BodyHeld
 from engage_hri.schemas.requests import Accepted, Cancel, Refused
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.body import Reached, Revocation

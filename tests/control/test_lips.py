@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import pytest
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import FaceShift, Mark, Speech
 from engage_hri.schemas.body_faults import BodyFault
@@ -13,7 +14,7 @@ from engage_hri.services.control.contract.body import MouthShape
 from engage_hri.services.control.testing import WORLD, Stage, performed
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.torso.mouth import CHANGE, Mouth
-from engage_hri.services.control.voice.lipsync import mouth_shapes
+from engage_hri.services.control.voice.lips import spelled
 from engage_hri.services.control.voice.timeline import utter
 from tests.control.test_alive import TEXT, sampled, shown
 
@@ -29,7 +30,7 @@ def summed(shapes: Sequence[MouthShape], t: float) -> tuple[float, float]:
 
 
 def test_the_mouth_goes_from_shape_to_shape() -> None:
-    mouth, shapes = Mouth(), mouth_shapes(utter(TEXT), 10.0)
+    mouth, shapes = Mouth(), [replace(each, at=each.at + 10.0) for each in spelled(utter(TEXT))]
     mouth.move(shapes, 9.0)
 
     for step in range(6000):
@@ -39,7 +40,7 @@ def test_the_mouth_goes_from_shape_to_shape() -> None:
 
 
 def test_it_leaves_what_it_was_about_without_a_jump() -> None:
-    mouth, shapes = Mouth(), mouth_shapes(utter(TEXT), 10.0)
+    mouth, shapes = Mouth(), [replace(each, at=each.at + 10.0) for each in spelled(utter(TEXT))]
     mouth.move(shapes, 9.0)
     before = mouth.at(10.3)
     mouth.move((), 10.3)
@@ -51,14 +52,14 @@ def test_it_leaves_what_it_was_about_without_a_jump() -> None:
 
 
 def test_the_mouth_opens_for_each_syllable_and_closes_after_the_words() -> None:
-    shapes = mouth_shapes(utter("papa, tutu"), 0.0)
+    shapes = spelled(utter("papa, tutu"))
     words = utter("papa, tutu").words
 
     wide = [each for each in shapes if each.opening > 0.2]
     assert [each.width < 0 for each in wide] == [False, False, True, True]  # rounded for u
     assert [each.at for each in shapes if each.opening == 0.0] == [word.end for word in words]
-    assert mouth_shapes(utter("你好"), 0.0)
-    assert mouth_shapes(utter("👍"), 0.0) == ()
+    assert spelled(utter("你好"))
+    assert spelled(utter("👍")) == ()
 
 
 async def openings(body: SimulatedBody, stage: Stage) -> list[tuple[float, float]]:
@@ -154,4 +155,4 @@ async def test_another_voice_moves_the_lips_and_this_one_others() -> None:
 
     body.on_lips = heard.append
     await performed(body, Speech(id="s", text="papa"))
-    assert [bool(shapes) for shapes in heard] == [True, False]
+    assert [bool(shapes) for shapes in heard] == [True]

@@ -76,7 +76,7 @@ def test_a_sample_of_which_half_is_missing_is_refused_with_what_is_expected():
 
 WAITING = """
 import os, time
-from engage_hri.services.control.voice.settings import VoiceSettings
+from engage_hri.services.control.voice.synthesis import VoiceSettings
 from engage_hri.services.control.voice.sounding import SoundingVoice
 from engage_hri.services.control.voice.synthesis import Said, Synthesizer
 

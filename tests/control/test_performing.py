@@ -17,7 +17,7 @@ from engage_hri.schemas.body import AbortBehavior, BehaviorAborted, BehaviorOutc
 from engage_hri.schemas.references import type_name
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.contract.body import Arrived, MovementAuthority, Progress, Reached, Spoke
-from engage_hri.services.control.serving.progress_check import SKEW, Told, sound
+from engage_hri.services.control.serving.live_behavior import SKEW, Told, sound
 from engage_hri.services.control.serving.steps import Nonsense
 from engage_hri.services.control.testing import BEHAVIORS
 from tests.control.directing import robot

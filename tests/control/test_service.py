@@ -6,7 +6,6 @@ from typing import Any
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.behaviors import Emit, Gaze, GazeShift, Head, Mark, Pointing, Speech, Wait
 from engage_hri.schemas.body import (
     AbortBehavior,
@@ -25,6 +24,7 @@ from engage_hri.schemas.body import (
     WordSpoken,
 )
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.requests import Outcome
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub

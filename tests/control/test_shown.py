@@ -6,9 +6,9 @@ from itertools import pairwise
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import OngoingActions
 from engage_hri.schemas.behaviors import Gaze, GazeShift, Pointing, Speech
 from engage_hri.schemas.body import RobotState
+from engage_hri.schemas.perception import OngoingActions
 from engage_hri.services.bus.memory import MemoryHub
 from tests.control.directing import robot
 from tests.ongoing import going_on

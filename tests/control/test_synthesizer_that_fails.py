@@ -26,7 +26,7 @@ from engage_hri.services.control.voice.worker import Order, packed
 ILL = """
 import os, time
 import numpy as np
-from engage_hri.services.control.voice.settings import VoiceSettings
+from engage_hri.services.control.voice.synthesis import VoiceSettings
 from engage_hri.services.control.voice.sounding import SoundingVoice
 from engage_hri.services.control.voice.synthesis import Said, Synthesizer
 

@@ -5,7 +5,7 @@ import pytest
 from engage_hri.schemas.behaviors import Head
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.contract.body import MovementAuthority, Reached
-from engage_hri.services.control.serving.progress_check import Told
+from engage_hri.services.control.serving.live_behavior import Told
 from tests.control.directing import robot
 
 NOD = Head(id="nod", lexeme="NOD", repetition=3)

@@ -30,15 +30,12 @@ from engage_hri.services.control.testing import Stage
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.voice import player
 from engage_hri.services.control.voice.clauses import clause
-from engage_hri.services.control.voice.outlets import STUCK, Gag, Outlet, Several
-from engage_hri.services.control.voice.parts import sounding
-from engage_hri.services.control.voice.settings import VoiceSettings
+from engage_hri.services.control.voice.outlets import STUCK, Outlet, Several, WavFile
 from engage_hri.services.control.voice.silent import SilentVoice
 from engage_hri.services.control.voice.sounding import SoundingVoice
-from engage_hri.services.control.voice.speaking import CHECK, OnePart, utter_parts
-from engage_hri.services.control.voice.synthesis import Heard, Phrase, Said, Synthesizer
+from engage_hri.services.control.voice.speaking import CHECK, sounding, utter_parts
+from engage_hri.services.control.voice.synthesis import Heard, Phrase, Said, Synthesizer, VoiceSettings
 from engage_hri.services.control.voice.timeline import pieces
-from engage_hri.services.control.voice.wav import WavFile
 
 FULL = pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no /dev/full here")
 
@@ -66,8 +63,7 @@ def listening(voice: Voice) -> list[Fault]:
 
 
 def file_of(voice: Voice) -> WavFile:
-    assert isinstance(voice._outlet.outlet, Several)
-    outlet = voice._outlet.outlet._outlets[-1]
+    outlet = voice._outlet.outlets[-1]
     assert isinstance(outlet, WavFile)
     return outlet
 
@@ -84,7 +80,7 @@ async def test_a_file_without_room_is_told_once_and_the_loudspeaker_goes_on(monk
     faults = listening(voice)
     async with voice.connected():
         now = asyncio.get_running_loop().time
-        monkeypatch.setattr(voice, "_outlet", Gag(Several([Outlet(now), file_of(voice)]), now))
+        monkeypatch.setattr(voice, "_outlet", Several(now, Outlet(now), file_of(voice)))
         for _ in range(2):
             assert await said(voice, "one two") == ["one", "two"]
 
@@ -195,13 +191,13 @@ async def course(
     begin = outlet.earliest()
     Taker.stops = begin + stops[0], begin + stops[1]
     piece = pieces(speech)[0]
-    parts = OnePart(sounding(piece, clause(Tones(), piece.phrase)))
+    part = sounding(piece, clause(Tones(), piece.phrase))
     if abort < inf:
         loop.call_at(begin + abort, authority.revoke)
     failed = ""
     try:
         async for each in utter_parts(
-            speech, authority, parts, outlet, lambda shapes: lips.append((loop.time(), shapes))
+            speech, authority, lambda number: part, outlet, lambda shapes: lips.append((loop.time(), shapes))
         ):
             told.append(each)
     except BodyFailed as error:
@@ -274,7 +270,9 @@ async def test_an_abort_takes_back_what_was_handed_over_after_the_word(
     with open(tmp_path / "said.wav", "wb", buffering=0) as file:  # noqa: ASYNC230
         device = await ready()
         begin = loop.time()
-        found = await course(Several([device, WavFile(file, "said.wav", Tones.rate, begin, loop.time)]), abort=at)
+        found = await course(
+            Several(loop.time, device, WavFile(file, "said.wav", Tones.rate, begin, loop.time)), abort=at
+        )
         last = next(
             (end for end, start in zip(ENDS, [0.0, *(end + 0.05 for end in ENDS)], strict=False) if start < at < end),
             at,

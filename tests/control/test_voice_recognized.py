@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from engage_hri.schemas.behaviors import Mark, Speech
-from engage_hri.schemas.speakable import tokens
+from engage_hri.schemas.text import tokens
 from engage_hri.services.control.contract.body import MovementAuthority, Reached
 from engage_hri.services.control.voice.espeak import EspeakSettings
 from engage_hri.services.control.voice.sounding import EspeakVoice

@@ -21,7 +21,7 @@
 | `20 time` | nothing happens |
 """
 
-from engage_hri.schemas.actions import ActorFound, ActorLost
+from engage_hri.schemas.perception import ActorFound, ActorLost
 from tests.generation.heads import AT, Stage, act, event, inhibition, looking_at, on_the_face, statistics, world
 from tests.stories import Story, number
 

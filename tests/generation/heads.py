@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
-from engage_hri.schemas.attention import Claim
 from engage_hri.schemas.body import BodyPose, Ray, RobotState
+from engage_hri.schemas.fragments import Claim
+from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
 from engage_hri.schemas.units import Seconds, Stamp, Vector
 from engage_hri.schemas.world import Entity, World

@@ -7,10 +7,15 @@ from functools import partial
 from typing import Any
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan
-from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.behaviors import Gaze, GazeShift, Pointing
-from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.blocks import (
+    Block,
+    BlockOutcome,
+    BlockProgress,
+    PerformBlock,
+    SyncPointProgress,
+    WarningFeedback,
+)
 from engage_hri.schemas.body import (
     AbortBehavior,
     BehaviorAborted,
@@ -24,9 +29,9 @@ from engage_hri.schemas.body import (
     Ray,
 )
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
-from engage_hri.schemas.fragments import PerformFragment, TurnFragment
+from engage_hri.schemas.fragments import HeadOwner, PerformFragment, TurnFragment
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn, TurnOutcome
 from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.units import Vector

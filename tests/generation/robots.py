@@ -6,12 +6,10 @@ from contextlib import asynccontextmanager
 from functools import partial
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound
-from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.behaviors import Action, FragmentBehavior, Reference, Speech, SpeechOption
-from engage_hri.schemas.blocks import PerformBlock
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
-from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnClosed, TurnFragment
+from engage_hri.schemas.blocks import BlockProgress, PerformBlock, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.fragments import FragmentOutcome, HeadOwner, PerformFragment, TurnClosed, TurnFragment
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound
 from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub

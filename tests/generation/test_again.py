@@ -10,17 +10,21 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound
-from engage_hri.schemas.attention import Inhibit
 from engage_hri.schemas.behaviors import Action, Reference, Speech, SpeechOption
 from engage_hri.schemas.blocks import InterruptBehavior
 from engage_hri.schemas.body import AbortBehavior
 from engage_hri.schemas.body_faults import BodyFault, SwitchFaults
-from engage_hri.schemas.conditions import SetCondition
-from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment, TurnFragment, TurnStatus
-from engage_hri.schemas.ledger import Taken
+from engage_hri.schemas.fragments import (
+    FragmentOutcome,
+    Inhibit,
+    PerformFragment,
+    SetCondition,
+    TurnFragment,
+    TurnStatus,
+)
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import Utterance
+from engage_hri.schemas.participants import Taken
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, Utterance
 from engage_hri.schemas.recognition import SignalTurn
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub

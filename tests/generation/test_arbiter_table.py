@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import pytest
 
-from engage_hri.schemas.actions import ActorLost
+from engage_hri.schemas.perception import ActorLost
 from engage_hri.schemas.world import Entity, World
 from tests.generation.head_stories import check
 from tests.generation.heads import AT, Stage, act, event, inhibition, on_the_face, statistics, world

@@ -5,8 +5,8 @@ import asyncio
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Gaze, Pointing
-from engage_hri.schemas.covered import COVERED_FOR
 from engage_hri.schemas.fragments import FragmentOutcome
+from engage_hri.schemas.world import COVERED_FOR
 from engage_hri.services.bus.memory import MemoryHub
 from tests.generation.partners import TABLE, stage
 from tests.generation.test_service import refers, says

@@ -5,9 +5,8 @@ import asyncio
 import pytest
 
 from engage_hri.schemas.behaviors import Gaze, Speech
-from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
+from engage_hri.schemas.fragments import FragmentOutcome, StudyCondition, TurnFragment
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.feeds import Feed
 from engage_hri.services.client.robot import Robot

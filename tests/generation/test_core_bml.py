@@ -9,14 +9,20 @@ from msgspec.structs import replace
 from engage_hri.schemas import behaviors as of
 from engage_hri.schemas import keys
 from engage_hri.schemas.behavior_types import dialect_sync, sync_points
-from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.blocks import (
+    Block,
+    BlockOutcome,
+    BlockProgress,
+    Feedback,
+    PerformBlock,
+    SyncPointProgress,
+    WarningFeedback,
+)
 from engage_hri.schemas.documents.dialects import core, in_dialect
 from engage_hri.schemas.documents.xml_decode import decode_xml, encode_xml
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.feedback import BlockProgress, Feedback, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.references import type_name
-from engage_hri.schemas.syncref import SyncRef
+from engage_hri.schemas.references import SyncRef, type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline.shell.config import Config, load

@@ -15,7 +15,7 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.tool_call import from_tool, in_call
+from engage_hri.schemas.tool import from_tool, in_call
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.generation.fragment_check import checked
 from tests.generation.partners import TABLE

@@ -2,7 +2,7 @@
 
 import pytest
 
-from engage_hri.schemas.actions import ActorLost
+from engage_hri.schemas.perception import ActorLost
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.generation.head.maintenance_policy import HAND_ONSET, HAND_STILLNESS, HandWatch
 from tests.generation.heads import AT

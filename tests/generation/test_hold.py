@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.attention import Inhibit
 from engage_hri.schemas.behaviors import Gaze
+from engage_hri.schemas.fragments import Inhibit
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.torso.body import SimulatedBody
 from tests.commanding import command

@@ -5,11 +5,11 @@ import asyncio
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActorFound
+from engage_hri.schemas.perception import ActionBegan, ActorFound
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.people.perceived_actions import PerceivedActions
+from engage_hri.services.client.people.perceived_person import PerceivedActions
 from engage_hri.services.reports.action_reports import REPORT_GRACE
 from tests.generation.partners import TABLE, Partners, stage
 

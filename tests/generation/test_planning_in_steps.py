@@ -7,10 +7,9 @@ from unittest.mock import patch
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.attention import Inhibit
 from engage_hri.schemas.behaviors import Gaze, Pointing, Reference, Speech, SpeechOption
 from engage_hri.schemas.body import EstimateBehaviors
-from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
+from engage_hri.schemas.fragments import FragmentOutcome, Inhibit, TurnFragment
 from engage_hri.schemas.messages import Message
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.generation import body_link

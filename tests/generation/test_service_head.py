@@ -5,10 +5,9 @@ import asyncio
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.attention import Inhibit, InhibitionEnded
 from engage_hri.schemas.behaviors import Gaze, GazeShift, Pointing, Speech
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
+from engage_hri.schemas.fragments import FragmentOutcome, Inhibit, InhibitionEnded, TurnFragment
 from engage_hri.schemas.recognition import Statistics, WindowStatistics
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub

@@ -7,7 +7,7 @@ import pytest
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import session_of
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.sight import LATE, Sight

@@ -9,16 +9,15 @@ import pytest
 from engage_hri import perceive
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Speech
+from engage_hri.schemas.blocks import SyncPointProgress
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import OutcomeUnknown
-from engage_hri.schemas.feedback import SyncPointProgress
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.summary import Summary, summary
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.language_models import perform_call, stream
-from engage_hri.services.client.results import PerformFailed
-from engage_hri.services.client.robot import Robot
+from engage_hri.services.client.robot import PerformFailed, Robot
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.runtime.service import running

@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
+from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.turns.policy import Aborted, TurnPlan, TurnPolicy, in_vain, plan_turn

@@ -15,10 +15,9 @@ from msgspec import Raw, json
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.behaviors import Gaze, Speech, Wait
 from engage_hri.schemas.faults import EngageError
-from engage_hri.schemas.perception import Utterance
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, Utterance
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
@@ -28,8 +27,7 @@ from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.console.web import orders
-from engage_hri.services.console.web.frames import Viewer
-from engage_hri.services.console.web.receipts import Receipts
+from engage_hri.services.console.web.frames import Receipts, Viewer
 from engage_hri.services.console.web.script import Script
 from engage_hri.services.console.web.service import WindowServer, window
 from engage_hri.services.console.web.visitor import Visitor

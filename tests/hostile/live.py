@@ -13,7 +13,7 @@ from typing import NamedTuple
 import zenoh
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.status import AskStatus, Status
+from engage_hri.schemas.participants import AskStatus, Status
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.commandline.shell.roster import ROBOT

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator
 
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.blocks import BlockProgress, SyncPointProgress, WarningFeedback
 from tests.judge.case import Case, Finding
 
 HARMLESS = ("LATE", "DEGRADED")

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from itertools import combinations, pairwise, permutations
 from math import inf
 
-from engage_hri.schemas.feedback import WarningFeedback
+from engage_hri.schemas.blocks import WarningFeedback
 from tests.judge.case import Case, Finding, merged, within
 from tests.judge.reading import SHIFTS, WITH_STROKE, Place, Reading, Relation, Term
 

@@ -13,11 +13,10 @@ from functools import partial
 import msgspec
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.blocks import Block, BlockOutcome, InterruptBehavior, PerformBlock
+from engage_hri.schemas.blocks import Block, BlockOutcome, Feedback, InterruptBehavior, PerformBlock
 from engage_hri.schemas.body import EstimateBehaviors, EstimateItem, Estimates, SyncPointReached, WordSpoken
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.faults import EngageError, RequestRefused
-from engage_hri.schemas.feedback import Feedback
 from engage_hri.services.bus.interface import LOG, Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.config import ControlConfig, Variability

@@ -6,15 +6,15 @@ from itertools import pairwise
 
 from msgspec import Struct, field
 
-from engage_hri.schemas.blocks import BlockOutcome
-from engage_hri.schemas.body import Ray, SyncPointReached, WordSpoken
-from engage_hri.schemas.feedback import (
+from engage_hri.schemas.blocks import (
+    BlockOutcome,
     BlockProgress,
     Feedback,
     PredictionFeedback,
     SyncPointProgress,
     WarningFeedback,
 )
+from engage_hri.schemas.body import Ray, SyncPointReached, WordSpoken
 
 
 class Told(Struct):

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from engage_hri.schemas.blocks import BlockProgress, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.body import Ray
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from tests.judge import laws_motion, playing, reading
 from tests.judge.laws import LAWS, judge
 from tests.judge.record import Record, Steered, Told

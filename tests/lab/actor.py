@@ -7,7 +7,7 @@ the bus, and prints the instant, as its machine's clock has it.
 import asyncio
 import sys
 
-from engage_hri.schemas.actions import ActionBegan
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.services.bus.zenoh.hub import open_hub
 
 

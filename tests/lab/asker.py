@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import NoReply
-from engage_hri.schemas.status import AskStatus
+from engage_hri.schemas.participants import AskStatus
 from engage_hri.services.bus.zenoh.hub import open_hub
 
 PATIENCE = 2.5

@@ -11,10 +11,10 @@ import time
 from typing import Any
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import BodyHeld
 from engage_hri.schemas.body import BehaviorOutcome, RobotState, WordSpoken
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome
-from engage_hri.schemas.holds import BodyHeld
 from engage_hri.schemas.requests import Accepted, Outcome, Refused
 from engage_hri.services.bus.zenoh.hub import ZenohHub
 from engage_hri.services.bus.zenoh.links import Router, RouterNews

@@ -39,8 +39,14 @@ from engage_hri.schemas.behaviors import (
     Timing,
     Wait,
 )
-from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
-from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback, WarningKind
+from engage_hri.schemas.blocks import (
+    Block,
+    BlockOutcome,
+    PerformBlock,
+    SyncPointProgress,
+    WarningFeedback,
+    WarningKind,
+)
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.config import ControlConfig

@@ -16,9 +16,8 @@ from itertools import combinations
 from random import Random
 from typing import NamedTuple
 
-from engage_hri.schemas.blocks import Block, BlockOutcome
+from engage_hri.schemas.blocks import Block, BlockOutcome, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.documents.xml_decode import decode_xml
-from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
 from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.runtime.virtual_time import run_virtual

@@ -30,7 +30,7 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate, Phase
-from engage_hri.schemas.syncref import SyncRef
+from engage_hri.schemas.references import SyncRef
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused

@@ -8,7 +8,15 @@ from typing import Any
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import BlockBehavior
-from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.blocks import (
+    Block,
+    BlockOutcome,
+    BlockProgress,
+    PerformBlock,
+    PredictionFeedback,
+    SyncPointProgress,
+    WarningFeedback,
+)
 from engage_hri.schemas.body import (
     BehaviorOutcome,
     Estimate,
@@ -22,12 +30,6 @@ from engage_hri.schemas.body import (
 )
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import (
-    BlockProgress,
-    PredictionFeedback,
-    SyncPointProgress,
-    WarningFeedback,
-)
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Accepted, Answer, Cancel, Refused, Request, answering
 from engage_hri.schemas.units import Seconds, Stamp

@@ -9,9 +9,15 @@ from msgspec import Struct, field
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import After, Before, BlockBehavior, Constraint, Synchronize
-from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
+from engage_hri.schemas.blocks import (
+    Block,
+    BlockOutcome,
+    BlockProgress,
+    PerformBlock,
+    SyncPointProgress,
+    WarningFeedback,
+)
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn, TurnOutcome
 from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.units import Seconds

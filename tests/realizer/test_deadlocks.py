@@ -20,7 +20,6 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.blocks import Block
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place, Transition
-from engage_hri.services.realizer.plan.losses import Loss, Losses
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.plan.words import way_round
@@ -151,10 +150,6 @@ def test_behaviors_that_begin_with_each_others_ends_are_told_in_so_many_words() 
 
 def _list(lines: list[int]) -> str:
     return ", ".join(map(str, lines))
-
-
-def test_losses_are_told_with_their_reasons() -> None:
-    assert str(Losses([Loss("a", "is late"), Loss("b", "is early")])) == "a is late; b is early"
 
 
 NET = PetriNet(tuple(Transition(name, ()) for name in ("bml:start", "a:start", "a:ready", "a:end = b:start")), ())

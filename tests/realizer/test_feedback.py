@@ -1,7 +1,7 @@
 """What the realizer says of a block: predictions while they are worth telling, and who it is about."""
 
 from engage_hri.schemas.behaviors import Head, Pointing, Speech
-from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.blocks import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.realizer.report import MOVED, moved_noticeably
 from tests.realizer.fake_body import FakeBody, Script

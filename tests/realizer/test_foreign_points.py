@@ -6,8 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Head, Speech, Wait
-from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.nets import Fired
+from engage_hri.schemas.blocks import Block, Fired
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.realizer.export import described, firings, tokens
 from engage_hri.services.realizer.plan.known import BLOCK_END, Known

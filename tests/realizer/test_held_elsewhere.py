@@ -6,8 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import FaceLexeme, Gaze, Gesture, Mark, Speech, Wait
-from engage_hri.schemas.blocks import PerformanceSteered
-from engage_hri.schemas.feedback import SyncPointProgress
+from engage_hri.schemas.blocks import PerformanceSteered, SyncPointProgress
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed
 from tests.realizer.stage import Stage, after, block, stage, together

@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from engage_hri.schemas.behaviors import Gesture, Mark, Speech, Wait
-from engage_hri.schemas.feedback import WarningFeedback
+from engage_hri.schemas.blocks import WarningFeedback
 from engage_hri.services.control.config import Stall, Variability
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions

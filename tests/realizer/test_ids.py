@@ -4,8 +4,7 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Speech, Wait
-from engage_hri.schemas.blocks import BlockOutcome, Composition, PerformBlock
-from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.schemas.blocks import BlockOutcome, BlockProgress, Composition, PerformBlock
 from engage_hri.services.requests.ends import Pending, RequestRefused
 from tests.realizer.stage import Stage, after, block, stage
 

@@ -229,7 +229,7 @@ def test_of_two_speeches_that_begin_at_once_the_later_gives_its_time_up() -> Non
 
     assert (made.dropped, tuple(made.given_up)) == ((), ("t",))
     assert made.problems[0].message.endswith("; t:start = 1 is given up, so that the words are said")
-    assert "from t:start to t:end it takes 0.50 s at least, and there are 0.00 s" in made.problems[0].message
+    assert "s has the voice until s:end: s:start is 1 s after bml:start" in made.problems[0].message
 
 
 # -- parts that other blocks have -----------------------------------------------------------------------------------

@@ -32,9 +32,15 @@ from engage_hri.schemas.behaviors import (
     Synchronize,
     Wait,
 )
-from engage_hri.schemas.blocks import BehaviorInterrupted, Block, BlockOutcome, InterruptBehavior
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
-from engage_hri.schemas.syncref import SyncRef
+from engage_hri.schemas.blocks import (
+    BehaviorInterrupted,
+    Block,
+    BlockOutcome,
+    BlockProgress,
+    InterruptBehavior,
+    SyncPointProgress,
+)
+from engage_hri.schemas.references import SyncRef
 from engage_hri.services.requests.ends import Pending, Requester, RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.random_cases import share_of

@@ -9,8 +9,16 @@ from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Event, Gaze, Pointing, Speech, Wait
-from engage_hri.schemas.blocks import Block, BlockOutcome, Composition, PerformBlock
-from engage_hri.schemas.nets import Fired, NetMarked, NetPlanned, NetWaiting
+from engage_hri.schemas.blocks import (
+    Block,
+    BlockOutcome,
+    Composition,
+    Fired,
+    NetMarked,
+    NetPlanned,
+    NetWaiting,
+    PerformBlock,
+)
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.realizer.net.running import RunningNet

@@ -7,8 +7,7 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gesture, Head, Speech
-from engage_hri.schemas.feedback import PredictionFeedback
-from engage_hri.schemas.nets import NetPlanned
+from engage_hri.schemas.blocks import NetPlanned, PredictionFeedback
 from engage_hri.services.requests.ends import Pending
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.planning import timed

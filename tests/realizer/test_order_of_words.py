@@ -13,12 +13,9 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import After, BlockBehavior, Constraint, Gesture, Head, Speech, Timing
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.xml_decode import decode_xml
-from engage_hri.services.realizer.net.petri_net import PetriNet, Place, Transition
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
-from engage_hri.services.realizer.plan.schedule import Circle
-from engage_hri.services.realizer.plan.speaking_order import SpeakingOrder
 from engage_hri.services.realizer.points import Point
 from tests.random_cases import share_of
 from tests.realizer.oracle import consult, estimate, relaxed
@@ -189,62 +186,3 @@ def test_many_sentences_that_have_to_wait_for_others_come_in_document_order_but_
     for each in range(count):
         expected |= dict.fromkeys([awaited[each], each] if each in awaited else [each])
     assert spoken(plan) == [f"s{number}" for number in expected]
-
-
-# -- the search through the orders, with circles as they come ------------------------------------------------------
-
-WORDS = ("a", "b", "c", "d", "e")
-ENDS = tuple(Point(id, sync) for id in WORDS for sync in ("start", "end"))
-NET = PetriNet(tuple(Transition(str(point), (point,)) for point in ENDS), ())
-
-
-def circle(earlier: str, later: str) -> Circle:
-    """What comes of it if one speech waits for another."""
-    source, target = ENDS.index(Point(earlier, "end")), ENDS.index(Point(later, "start"))
-    return ((Place("series", source, target, behavior=later), 0.0), (Place("phase", target, source), 1.0))
-
-
-def passes_alone(order: SpeakingOrder) -> bool:
-    at = {point: number for number, point in enumerate(ENDS)}
-    return order.pass_alone(NET, at, [0.0] * len(ENDS))
-
-
-def test_of_two_speeches_each_order_is_tried_and_then_one_is_lost() -> None:
-    order = SpeakingOrder(("a", "b"), 2)
-    assert (order.current, order.turns) == (("a", "b"), frozenset({("b", Point("a", "end"))}))
-    assert not passes_alone(order)
-    assert order.refute([circle("a", "b")], NET)
-    assert (order.current, order.turns) == ((), frozenset())
-    assert not order.refute([circle("a", "b")], NET)
-    assert passes_alone(order)
-    assert order.current == ("a", "b")
-    assert not order.refute([circle("a", "b"), circle("b", "a")], NET)  # the second does not come by this order
-    assert order.refute([circle("a", "b")], NET)
-    assert order.current == ("b", "a")
-    assert order.refute([circle("b", "a")], NET)
-    assert order.current in (("a", "b"), ("b", "a"))
-    assert not order.refute([circle(*order.current)], NET)
-    order.begin_anew({"a", "b"})
-    assert order.current == ("a", "b")
-    assert order.refute([circle("a", "b")], NET)
-
-
-@pytest.mark.parametrize(("size", "most"), [(1000, 4), (50, 8)])
-def test_of_a_large_block_few_orders_are_tried_and_none_anew(size: int, most: int) -> None:
-    order = SpeakingOrder(WORDS, size)
-    assert order.refute([circle("a", "b")], NET)
-    assert passes_alone(order)
-    tried: list[tuple[str, ...]] = []
-    while len(tried) < 20 and order.refute([circle(*pair) for pair in pairwise(order.current)], NET):
-        tried.append(order.current)
-    assert len(set(tried[:-1])) == len(tried) - 1 == most
-    order.begin_anew(set(WORDS))
-    assert order.current == WORDS
-    assert not order.refute([circle("a", "b")], NET)
-
-
-def test_a_single_speech_has_no_order() -> None:
-    order = SpeakingOrder(("a",), 1)
-
-    assert order.turns == frozenset()
-    assert not order.refute([circle("a", "b")], NET)

@@ -4,8 +4,8 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Gesture, Head, Mark, Pointing, Speech
+from engage_hri.schemas.blocks import PredictionFeedback
 from engage_hri.schemas.body import Estimate
-from engage_hri.schemas.feedback import PredictionFeedback
 from engage_hri.services.control.config import Variability
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Begin, Decisions, Extend

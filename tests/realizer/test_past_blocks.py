@@ -11,8 +11,7 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gesture, Speech, Wait
-from engage_hri.schemas.blocks import BlockOutcome, PerformBlock
-from engage_hri.schemas.feedback import WarningFeedback
+from engage_hri.schemas.blocks import BlockOutcome, PerformBlock, WarningFeedback
 from engage_hri.services.realizer.plan.relations import LASTING
 from engage_hri.services.realizer.together.live_blocks import MOST, Past
 from engage_hri.services.requests.ends import RequestRefused

@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from engage_hri.schemas.behaviors import Head, Speech, Wait
-from engage_hri.schemas.feedback import PredictionFeedback, SyncPointProgress
+from engage_hri.schemas.blocks import PredictionFeedback, SyncPointProgress
 from engage_hri.services.control.config import Variability
 from tests.realizer.planning import timed
 from tests.realizer.stage import Stage, after, block, stage

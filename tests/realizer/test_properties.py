@@ -26,7 +26,7 @@ from engage_hri.schemas.behaviors import (
     Wait,
 )
 from engage_hri.schemas.blocks import Block, BlockOutcome
-from engage_hri.schemas.syncref import SyncRef
+from engage_hri.schemas.references import SyncRef
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.net.petri_net import is_live
 from engage_hri.services.realizer.plan.plan import Plan

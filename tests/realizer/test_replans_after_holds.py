@@ -6,8 +6,7 @@ from collections.abc import Sequence
 import pytest
 
 from engage_hri.schemas.behaviors import BlockBehavior, FaceLexeme, Gesture, Speech, Wait
-from engage_hri.schemas.blocks import Block, BlockOutcome
-from engage_hri.schemas.feedback import PredictionFeedback
+from engage_hri.schemas.blocks import Block, BlockOutcome, PredictionFeedback
 from engage_hri.services.realizer.config import RealizerConfig
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import timed

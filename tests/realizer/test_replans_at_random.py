@@ -20,8 +20,7 @@ from engage_hri.schemas.behaviors import (
     Speech,
     Wait,
 )
-from engage_hri.schemas.blocks import Block, BlockOutcome
-from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
+from engage_hri.schemas.blocks import Block, BlockOutcome, SyncPointProgress, WarningFeedback
 from engage_hri.services.control.config import Variability
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual

@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gaze, Wait
-from engage_hri.schemas.blocks import BlockOutcome
+from engage_hri.schemas.blocks import BlockOutcome, BlockProgress, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.body import SyncPointArrived, SyncPointReached
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.plan.planner import plan_block

@@ -7,8 +7,7 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gaze, GazeShift, Mark, Pointing, Speech, Timing, Wait
-from engage_hri.schemas.blocks import PerformBlock
-from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback
+from engage_hri.schemas.blocks import BlockProgress, PerformBlock, PredictionFeedback
 from engage_hri.services.realizer.perform.performance import BlockPerformance
 from engage_hri.services.realizer.together import planning
 from engage_hri.services.requests.ends import RequestRefused

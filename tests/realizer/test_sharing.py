@@ -7,8 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import FaceLexeme, Gaze, GazeShift, Gesture, Head, Mark, Pointing, Posture, Speech
-from engage_hri.schemas.blocks import Block, BlockOutcome
-from engage_hri.schemas.feedback import SyncPointProgress
+from engage_hri.schemas.blocks import Block, BlockOutcome, SyncPointProgress
 from engage_hri.services.realizer.plan.assembly import Assembler
 from engage_hri.services.realizer.plan.handover import Arrangement
 from engage_hri.services.realizer.plan.known import Holder, Known, holders_of, qualified

@@ -26,10 +26,9 @@ from engage_hri.schemas.behaviors import (
     Speech,
     Timing,
 )
-from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.blocks import Block, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.body import PerformBehavior
-from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
-from engage_hri.schemas.syncref import SyncRef
+from engage_hri.schemas.references import SyncRef
 from engage_hri.services.control.config import Variability
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual

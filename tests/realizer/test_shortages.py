@@ -4,9 +4,8 @@ import re
 
 import pytest
 
-from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.blocks import Block, WarningFeedback
 from engage_hri.schemas.documents.xml_decode import decode_xml
-from engage_hri.schemas.feedback import WarningFeedback
 from engage_hri.services.control.config import Variability
 from tests.realizer.test_simulated_body import robot
 

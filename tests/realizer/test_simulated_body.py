@@ -17,8 +17,14 @@ from msgspec import Struct, field
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gaze, Gesture, Mark, Pointing, Speech
-from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.blocks import (
+    Block,
+    BlockOutcome,
+    BlockProgress,
+    PerformBlock,
+    SyncPointProgress,
+    WarningFeedback,
+)
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub

@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Constraint, Gaze, Speech
-from engage_hri.schemas.blocks import Block, BlockOutcome
+from engage_hri.schemas.blocks import Block, BlockOutcome, BlockProgress
 from engage_hri.schemas.body import SyncPointReached
-from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.services.realizer.plan.known import Known
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block, plan_tries

@@ -4,8 +4,7 @@ import asyncio
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gesture, Mark, Speech
-from engage_hri.schemas.blocks import BlockOutcome
-from engage_hri.schemas.holds import Held
+from engage_hri.schemas.blocks import BlockOutcome, Held
 from tests.realizer.stage import block, stage
 from tests.realizer.steering import steered
 

@@ -2,9 +2,9 @@
 
 import pytest
 
+from engage_hri.schemas.behavior_types import SYNC_POINTS
 from engage_hri.schemas.behaviors import Head, Wait
 from engage_hri.schemas.blocks import BlockOutcome
-from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.services.control.config import Slow, Variability
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import after, block, stage

@@ -6,9 +6,8 @@ import msgspec
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.blocks import BlockOutcome
-from engage_hri.schemas.feedback import WarningFeedback
-from engage_hri.schemas.limits import LARGEST_XML_SENT
+from engage_hri.schemas.access import LARGEST_XML_SENT
+from engage_hri.schemas.blocks import BlockOutcome, WarningFeedback
 from engage_hri.schemas.requests import Refused
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline.shell.config import Config

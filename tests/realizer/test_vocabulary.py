@@ -8,9 +8,8 @@ from types import ModuleType
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.blocks import Block, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.documents.xml_decode import decode_xml
-from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
 from engage_hri.schemas.vocabulary import Term, terms
 from engage_hri.services.control.config import Variability
 from tests.realizer.test_simulated_body import robot

@@ -8,8 +8,7 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gesture, Speech, Wait
-from engage_hri.schemas.blocks import Block, BlockOutcome
-from engage_hri.schemas.holds import Held
+from engage_hri.schemas.blocks import Block, BlockOutcome, Held
 from engage_hri.services.realizer.config import RealizerConfig
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import Stage, block, stage

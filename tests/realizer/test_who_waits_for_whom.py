@@ -6,8 +6,7 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gesture, Wait
-from engage_hri.schemas.blocks import BlockOutcome
-from engage_hri.schemas.holds import Held
+from engage_hri.schemas.blocks import BlockOutcome, Held
 from engage_hri.schemas.requests import Refused
 from engage_hri.services.requests.ends import Pending, RequestRefused
 from tests.realizer.puppet import bml, puppet

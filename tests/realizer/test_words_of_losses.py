@@ -120,7 +120,7 @@ def test_of_two_speeches_that_overlap_it_is_told_who_has_the_voice_and_no_riddle
     phase = Phase(since="start", to="end", shortest=0.9, natural=0.9)
     estimates = [Estimate(behavior=id, feasible=True, parts=("voice",), phases=(phase,)) for id in ("a", "b")]
     (problem,) = plan_block(block, estimates).problems
-    reason = "line 2: cannot be on time: b has the voice until b:end, and a cannot wait for that: "
+    reason = "line 2: cannot be on time: a has the voice until a:end: a:start is 1 s after bml:start, a takes 0.9 s "
     assert problem.message.startswith(reason)
     assert problem.message.endswith("; b:start = 1.2 is given up, so that the words are said")
     assert "would come" not in problem.message

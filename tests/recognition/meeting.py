@@ -10,10 +10,10 @@ from heapq import merge
 from itertools import count
 from typing import Literal
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.behaviors import Action, TurnSignal
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
+from engage_hri.schemas.blocks import BlockProgress, SyncPointProgress
+from engage_hri.schemas.fragments import Claim, HeadOwner
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import SignalTurn
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.events.session import Observation

@@ -2,11 +2,11 @@
 
 from typing import Any
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.attention import Claim, ClaimKind, HeadOwner
 from engage_hri.schemas.behaviors import Action, Event, EventKind, TurnSignal
+from engage_hri.schemas.blocks import BlockProgress, SyncPointProgress
 from engage_hri.schemas.faults import Cause
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
+from engage_hri.schemas.fragments import Claim, ClaimKind, HeadOwner
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn
 from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.units import Stamp

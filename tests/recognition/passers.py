@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.perception import HeadPose, VoiceActivity
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose, VoiceActivity
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World

@@ -8,13 +8,13 @@ import pytest
 from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.behaviors import Action, Event, TurnSignal
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Subscription
 from engage_hri.services.bus.memory import MemoryBus
-from engage_hri.services.client.people.perceived_actions import PerceivedActions
+from engage_hri.services.client.people.perceived_person import PerceivedActions
 from engage_hri.services.recognition import intake, service
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.session import Session

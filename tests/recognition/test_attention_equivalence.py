@@ -6,7 +6,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome
 from engage_hri.schemas.requests import Accepted
 from engage_hri.services.recognition.config import RecognitionConfig

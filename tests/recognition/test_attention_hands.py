@@ -5,7 +5,7 @@ from random import Random
 
 import pytest
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.units import Vector
 from tests.recognition.observations import HUMAN, ROBOT
 from tests.recognition.raw import PLACES, Watch, frames, hand

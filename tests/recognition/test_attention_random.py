@@ -5,7 +5,7 @@ from random import Random
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engage_hri.schemas.actions import ActorFound, ActorLost
+from engage_hri.schemas.perception import ActorFound, ActorLost
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventOutcome, SignalTurn
 from engage_hri.schemas.requests import Accepted, Refused
 from engage_hri.services.recognition.config import RecognitionConfig

@@ -7,11 +7,10 @@ from contextlib import asynccontextmanager
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.behaviors import TurnSignal
 from engage_hri.schemas.body import BodyPose, Ray, RobotState
 from engage_hri.schemas.messages import encode
-from engage_hri.schemas.perception import HeadPose
+from engage_hri.schemas.perception import ActionBegan, HeadPose
 from engage_hri.schemas.recognition import EventOutcome, SignalTurn
 from engage_hri.schemas.units import Vector
 from engage_hri.services.bus.interface import Bus

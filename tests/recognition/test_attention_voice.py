@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engage_hri.schemas.actions import ActionBegan
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.perceive.attention import Attention
 from tests.recognition.observations import HUMAN, ROBOT

@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, EventState
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.memory import MemoryBus, MemoryHub

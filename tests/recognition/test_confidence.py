@@ -2,7 +2,7 @@
 
 import pytest
 
-from engage_hri.schemas.actions import ActionBegan
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.recognition import ConnectionEvent
 from tests.recognition.observations import HUMAN, ROBOT, Log, asked, stamp
 

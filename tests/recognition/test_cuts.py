@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActorFound, ActorLost
+from engage_hri.schemas.perception import ActorFound, ActorLost
 from engage_hri.services.recognition.events.conversation import TURN_PATIENCE
 from tests.bus.cuttable import CuttableHub
 from tests.recognition.observations import ROBOT

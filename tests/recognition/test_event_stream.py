@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
+from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventOutcome, OpenEvents, RequestEvent
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Bus

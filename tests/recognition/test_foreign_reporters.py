@@ -5,8 +5,8 @@ import asyncio
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.messages import Message, encode_json
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.reports.ongoing_actions import MOST
 from tests.recognition.observations import ROBOT

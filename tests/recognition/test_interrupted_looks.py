@@ -2,7 +2,7 @@
 
 import pytest
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.interrupted_looks import LOOK_BREAK

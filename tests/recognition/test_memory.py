@@ -6,7 +6,7 @@ from itertools import islice
 
 import pytest
 
-from engage_hri.schemas.actions import ActionBegan
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.config import RecognitionConfig

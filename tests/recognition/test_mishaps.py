@@ -6,7 +6,7 @@ from collections import Counter
 import pytest
 from msgspec.structs import replace
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorLost
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome
 from engage_hri.schemas.requests import Accepted
 from engage_hri.services.recognition.config import RecognitionConfig

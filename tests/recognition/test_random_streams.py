@@ -7,10 +7,10 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.attention import Claim, HeadOwner
 from engage_hri.schemas.behaviors import TurnSignal
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
+from engage_hri.schemas.blocks import BlockProgress, SyncPointProgress
+from engage_hri.schemas.fragments import Claim, HeadOwner
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventOutcome, SignalTurn, TurnOutcome
 from engage_hri.schemas.requests import Accepted, Cancel, Refused
 from engage_hri.services.recognition.config import RecognitionConfig

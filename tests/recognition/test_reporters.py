@@ -1,8 +1,8 @@
 """What reporters say holds as long as they are there, and for a grace after that; a state shows what was missed."""
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.behaviors import Action
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.reports.action_reports import ActionReports
 from engage_hri.services.reports.ongoing_actions import ActionEvent, GoesOn, TimedReport

@@ -8,11 +8,11 @@ from asyncio.subprocess import PIPE, STDOUT, Process
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActorFound
 from engage_hri.schemas.behaviors import Event
+from engage_hri.schemas.perception import ActionBegan, ActorFound
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent
 from engage_hri.services.bus.zenoh.hub import open_hub
-from engage_hri.services.client.people.perceived_actions import PerceivedActions
+from engage_hri.services.client.people.perceived_person import PerceivedActions
 from engage_hri.services.requests.ends import Requester
 from tests.bus.places import PATIENCE, free_endpoint
 from tests.recognition.observations import HUMAN, world

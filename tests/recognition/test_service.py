@@ -6,10 +6,10 @@ from functools import partial
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.behaviors import Event, TurnSignal
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.blocks import BlockProgress, SyncPointProgress
+from engage_hri.schemas.participants import PeerAlive, PeerGone
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, Statistics
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Bus

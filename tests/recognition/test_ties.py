@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from engage_hri.schemas.actions import ActionBegan
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.limits import in_time

@@ -2,8 +2,8 @@
 
 import pytest
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import Event, TurnSignal
+from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.recognition import ConnectionEvent, RequestEvent, SignalTurn
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.perceive.words import TimedWords

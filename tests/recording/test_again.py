@@ -9,15 +9,15 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.behaviors import Event
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.ledger import Step, Taken
+from engage_hri.schemas.participants import Step, Taken
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import RequestEvent
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.samples import Received
-from engage_hri.services.client.people.perceived_actions import PerceivedActions
+from engage_hri.services.client.people.perceived_person import PerceivedActions
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.study.again import again
 from engage_hri.services.recognition.config import RecognitionConfig

@@ -8,9 +8,9 @@ import pytest
 from msgspec import structs
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
-from engage_hri.schemas.conditions import StudyCondition
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.fragments import StudyCondition
+from engage_hri.schemas.participants import PeerAlive, PeerGone
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Bus, Sample

@@ -10,7 +10,7 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.presence import PeerAlive
+from engage_hri.schemas.participants import PeerAlive
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.recording.disk import read, repair
 from engage_hri.services.recording.service import FLUSH

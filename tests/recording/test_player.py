@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.services.bus.interface import Sample
 from engage_hri.services.recording.player import Playback, Timeline
 from tests.recording.files import recording, sample

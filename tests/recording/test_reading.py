@@ -12,7 +12,7 @@ from mcap.reader import make_reader
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.presence import PeerAlive
+from engage_hri.schemas.participants import PeerAlive
 from engage_hri.services.bus.interface import Sample
 from engage_hri.services.recording import reading
 from engage_hri.services.recording.disk import read, repair

@@ -13,8 +13,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.body import Capabilities
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.presence import PeerAlive
-from engage_hri.schemas.status import AskStatus, Status
+from engage_hri.schemas.participants import AskStatus, PeerAlive, Status
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.recording import disk

@@ -8,7 +8,7 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Hub, Received, Sample

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.settings import DEEPEST, ServiceSettings, SettingsFile, sections, text_of
+from engage_hri.schemas.participants import DEEPEST, ServiceSettings, SettingsFile, sections, text_of
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline.shell import roster

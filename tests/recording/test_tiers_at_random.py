@@ -10,13 +10,12 @@ from pathlib import Path
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.attention import Claim, HeadOwner
+from engage_hri.schemas.blocks import BlockProgress, SyncPointProgress
 from engage_hri.schemas.body import WordSpoken
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
+from engage_hri.schemas.fragments import Claim, HeadOwner
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import Utterance
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, Utterance
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Sample

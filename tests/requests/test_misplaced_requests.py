@@ -6,11 +6,10 @@ from typing import get_args
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.attention import Inhibit
 from engage_hri.schemas.behaviors import TurnSignal
 from engage_hri.schemas.blocks import Block, InterruptBehavior, PerformBlock
 from engage_hri.schemas.body import GoHome
-from engage_hri.schemas.fragments import PerformFragment, TurnFragment
+from engage_hri.schemas.fragments import Inhibit, PerformFragment, TurnFragment
 from engage_hri.schemas.messages import COMMANDS, Message
 from engage_hri.schemas.recognition import SignalTurn
 from engage_hri.schemas.requests import Refused, Request

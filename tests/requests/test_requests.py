@@ -12,7 +12,7 @@ import pytest
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import BlockOutcome
 from engage_hri.schemas.faults import EngageError, Fault, RunFailed
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Accepted, Cancel, Refused, Request
 from engage_hri.services.bus.interface import Received
 from engage_hri.services.bus.memory import MemoryBus, MemoryHub

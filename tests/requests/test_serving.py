@@ -12,7 +12,7 @@ from engage_hri.schemas.blocks import Block, BlockOutcome, InterruptBehavior, Pe
 from engage_hri.schemas.body import PerformBehavior
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.messages import encode_json
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Accepted, Cancel, Heard, KeepAlive, Kept, Outdated, Refused, Request
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.memory import MemoryHub

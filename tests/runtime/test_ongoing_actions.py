@@ -5,7 +5,7 @@ import random
 from hypothesis import given
 from hypothesis import strategies as st
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.reports.ongoing_actions import MOST, ActionEvent, OngoingActionTracker
 from engage_hri.services.runtime.absent import FORGOTTEN_AFTER

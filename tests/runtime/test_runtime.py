@@ -5,9 +5,8 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import AskStatus, PeerAlive, PeerGone, Status
 from engage_hri.schemas.requests import Accepted
-from engage_hri.schemas.status import AskStatus, Status
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.runtime.service import Ready, running, serve

@@ -1,6 +1,6 @@
 """How long a world holds whose publisher has gone."""
 
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.reports.in_force import NOTHING, WorldReport
 

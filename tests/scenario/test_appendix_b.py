@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorLost
-from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.blocks import BlockProgress, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.fragments import HeadOwner
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.world import World
 from engage_hri.services.reports.action_reports import FACE_GRACE

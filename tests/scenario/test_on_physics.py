@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 pytest.importorskip("mujoco", reason="needs the extra `mujoco`")
 pytest.importorskip("espeakng_loader", reason="needs the extra `voice`")
 
+from engage_hri.schemas.blocks import SyncPointProgress, WarningFeedback
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import SyncPointProgress, WarningFeedback
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.recogniser import Recogniser

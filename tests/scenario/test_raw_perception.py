@@ -8,8 +8,8 @@ from functools import cache
 
 import pytest
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.services.runtime.virtual_time import run_virtual
 from engage_hri.services.tangram.people.config import PerceptionFaults, SimulationConfig
 from tests.scenario.playing import Record, play

@@ -10,10 +10,9 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import Utterance
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, Utterance
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.summary import summary
 from engage_hri.schemas.world import World

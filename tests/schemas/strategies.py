@@ -6,10 +6,10 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from engage_hri.schemas import behaviors as of
+from engage_hri.schemas.behavior_types import SYNC_POINTS
 from engage_hri.schemas.blocks import Block, Composition, Dialect
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
-from engage_hri.schemas.references import AnyBehavior, AnyInput
-from engage_hri.schemas.syncref import SYNC_POINTS, SyncRef
+from engage_hri.schemas.references import AnyBehavior, AnyInput, SyncRef
 
 # Letters that XML must escape, white space that it would collapse, and some beyond ASCII.
 LETTERS = "ab cXYZ09<>&\"'\t\n-:é€😀"

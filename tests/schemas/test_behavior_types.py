@@ -6,12 +6,11 @@ import pytest
 from lxml import etree
 
 from engage_hri.schemas import behaviors as of
-from engage_hri.schemas.behavior_types import ROWS, TYPES, dialect_sync, same_instant, sync_points
+from engage_hri.schemas.behavior_types import ROWS, SYNC_POINTS, TYPES, dialect_sync, same_instant, sync_points
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.documents.xml_encode import encode_xml
 from engage_hri.schemas.documents.xml_source import BML_1_0, EBML, split
-from engage_hri.schemas.syncref import SYNC_POINTS
 from tests.schemas.grammar import violations
 
 SAMPLES: tuple[of.BlockBehavior, ...] = (

@@ -2,8 +2,7 @@
 
 import pytest
 
-from engage_hri.schemas.covered import CoveredObjects
-from engage_hri.schemas.world import Entity, World
+from engage_hri.schemas.world import CoveredObjects, Entity, World
 
 CUP = Entity(id="cup", kind="object", position=(0.5, 0.0, 0.7))
 PLATE = Entity(id="plate", kind="object", position=(0.5, 0.2, 0.7))

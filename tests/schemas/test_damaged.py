@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from engage_hri.schemas.documents import json_codec
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.ledger import Step
 from engage_hri.schemas.messages import Message, decode, encode, encode_json
+from engage_hri.schemas.participants import Step
+from engage_hri.schemas.references import is_id
 from engage_hri.schemas.requests import Cancel
-from engage_hri.schemas.syncref import is_id
-from engage_hri.schemas.utf8 import utf8
+from engage_hri.schemas.text import utf8
 from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.simulation.still import EXAMPLE, load_world
 from tests.random_cases import share_of

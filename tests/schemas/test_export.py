@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from jsonschema import Draft202012Validator
 from referencing import Registry, Resource
 
-from engage_hri.schemas import lines
+from engage_hri.schemas import messages
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.json_codec import encode_json
 from engage_hri.schemas.export import BUNDLE, EXPORTED, ID, bundle, files, stale, write
@@ -124,11 +124,11 @@ def test_every_line_of_watch_fits() -> None:
     typed, fits, seen = RandomMessages(Random(5), Words()), validator("Line"), set()
     for name in MESSAGES * 10:
         message = typed.message(1.0, name)
-        if not refusal(message) and (line := lines.line(message)) is not None:
+        if not refusal(message) and (line := messages.line(message)) is not None:
             fits.validate(json.loads(line))
             seen.add(json.loads(line)["type"])
 
-    assert seen == {kind.__struct_config__.tag for kind in get_args(lines.LineMessage)}
+    assert seen == {kind.__struct_config__.tag for kind in get_args(messages.LineMessage)}
 
 
 def test_a_stale_file_is_noticed_and_put_right(tmp_path: Path) -> None:

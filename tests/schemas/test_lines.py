@@ -5,19 +5,18 @@ import json
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.attention import Claim, HeadOwner
-from engage_hri.schemas.export import bundle
-from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import (
+from engage_hri.schemas.blocks import (
     BlockProgress,
     PlannedPoint,
     PredictionFeedback,
     SyncPointProgress,
     WarningFeedback,
 )
-from engage_hri.schemas.lines import line
-from engage_hri.schemas.messages import Message, published
-from engage_hri.schemas.presence import PeerGone
+from engage_hri.schemas.export import bundle
+from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.fragments import Claim, HeadOwner
+from engage_hri.schemas.messages import Message, line, published
+from engage_hri.schemas.participants import PeerGone
 from engage_hri.schemas.recognition import ConnectionEvent, KindStatistics, OpenEvents, Statistics, WindowStatistics
 from engage_hri.schemas.units import Stamp
 

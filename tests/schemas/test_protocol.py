@@ -10,7 +10,7 @@ from typing import get_args
 import msgspec
 import pytest
 
-from engage_hri.schemas import keys, lines
+from engage_hri.schemas import keys, messages
 from engage_hri.schemas.export import ID
 from engage_hri.schemas.fragments import PerformFragment
 from engage_hri.schemas.messages import COMMANDS, OUTWARD, Message
@@ -77,7 +77,7 @@ def test_numbers_and_names_are_those_of_the_code(said: str) -> None:
     assert " ".join(said.split()) in " ".join(PAGE.split())
 
 
-@pytest.mark.parametrize("kind", get_args(lines.LineMessage))
+@pytest.mark.parametrize("kind", get_args(messages.LineMessage))
 def test_the_table_of_json_lines_names_the_message_of_each(kind: type[msgspec.Struct]) -> None:
     name, tag = kind.__name__, kind.__struct_config__.tag
 

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from engage_hri.schemas import ranges
+from engage_hri.schemas import units
 
-CHECKS = (ranges.positive, ranges.not_negative, ranges.shares, ranges.inner_shares)
+CHECKS = (units.positive, units.not_negative, units.shares, units.inner_shares)
 
 
 def is_taken(check: Callable[..., None], value: float) -> bool:

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from engage_hri.schemas.speakable import has_words, joined, tokens, word_count
+from engage_hri.schemas.text import has_words, joined, tokens, word_count
 from tests.random_cases import share_of
 
 MIXED = st.text(

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.schemas.behavior_types import canonical_sync, dialect_sync
-from engage_hri.schemas.syncref import SyncRef
+from engage_hri.schemas.references import SyncRef
 from tests.random_cases import share_of
 
 names = st.from_regex(r"[A-Za-z_][A-Za-z0-9_.-]{0,8}", fullmatch=True)

@@ -4,11 +4,10 @@ from functools import partial
 
 import pytest
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.blocks import BlockProgress
 from engage_hri.schemas.body import WordSpoken
-from engage_hri.schemas.feedback import BlockProgress
-from engage_hri.schemas.perception import Utterance
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, Utterance
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.simulation.attentive import AttentiveHuman
 from engage_hri.services.simulation.human import FACE, Act, Grab, Lay, LookAt, Start, Stop

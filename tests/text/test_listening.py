@@ -2,8 +2,8 @@
 
 import pytest
 
-from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.turns.policy import LONGEST_LISTENING, TurnPolicy

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from math import inf, isfinite
 from typing import NamedTuple
 
-from engage_hri.schemas.status import ClockOffset
+from engage_hri.schemas.participants import ClockOffset
 from engage_hri.schemas.units import Seconds, Stamp
 
 REFRESH: Seconds = 10.0

@@ -11,8 +11,7 @@ service itself. If too many tokens still stand some seconds later it was not the
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from engage_hri.schemas.access import Holder
-from engage_hri.schemas.limits import LOUD
+from engage_hri.schemas.access import LOUD, Holder
 from engage_hri.schemas.units import Seconds
 
 MOST_LINKS = 100

@@ -10,8 +10,8 @@ import re
 from collections import Counter
 from collections.abc import Callable
 
-from engage_hri.schemas.limits import LONGEST_KEY, MOST_MESSAGES, MOST_PULSES, MOST_QUESTIONS
-from engage_hri.schemas.utf8 import printable
+from engage_hri.schemas.access import LONGEST_KEY, MOST_MESSAGES, MOST_PULSES, MOST_QUESTIONS
+from engage_hri.schemas.text import printable
 from engage_hri.services.bus.often import is_told
 
 LEVELS = "error,zenoh_link_tls=debug,zenoh::net::routing::interceptor=trace,zenoh::net::routing::hat=off"

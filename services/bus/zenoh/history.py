@@ -22,8 +22,8 @@ import zenoh
 from msgspec import Struct
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.access import MEDIUM, most
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
-from engage_hri.schemas.limits import MEDIUM, most
 from engage_hri.schemas.messages import decode, in_form
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.zenoh.order import Counts, Envelope, Missing, Past, SentLog, Written, fitting

@@ -23,7 +23,7 @@ import zenoh
 from engage_hri.schemas import access, keys
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NotReady
 from engage_hri.schemas.messages import Message, decode, in_form, published
-from engage_hri.schemas.status import BusHealth, ProcessFacts
+from engage_hri.schemas.participants import BusHealth, ProcessFacts
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.answering import Answering
 from engage_hri.services.bus.config import Mode, is_on_this_machine, mode_of

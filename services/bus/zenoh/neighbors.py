@@ -10,7 +10,7 @@ import zenoh
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError
-from engage_hri.schemas.status import AskStatus, Status
+from engage_hri.schemas.participants import AskStatus, Status
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.config import is_encrypted, is_on_this_machine
 from engage_hri.services.bus.interface import LOG, Bus

@@ -25,7 +25,7 @@ from zlib import crc32
 from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.limits import LONGEST_KEY, SMALL
+from engage_hri.schemas.access import LONGEST_KEY, SMALL
 from engage_hri.schemas.units import Seconds
 
 KEPT = 4096

@@ -15,7 +15,7 @@ import msgspec
 import zenoh
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.status import Reachable
+from engage_hri.schemas.participants import Reachable
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.zenoh.clocks import REFRESH, Clocks
 from engage_hri.services.bus.zenoh.history import BAD, finish, pack

@@ -13,7 +13,7 @@ import zenoh
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Unreadable
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal

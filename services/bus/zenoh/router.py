@@ -11,8 +11,8 @@ import zenoh
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.access import Holder
+from engage_hri.schemas.text import printable
 from engage_hri.schemas.units import Seconds
-from engage_hri.schemas.utf8 import printable
 from engage_hri.services.bus.interface import LOG
 from engage_hri.services.bus.keyring import Keys
 from engage_hri.services.bus.zenoh.crowd import GOING, Crowd, Link

@@ -8,8 +8,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from engage_hri.schemas import access, keys
-from engage_hri.schemas.access import OWN, ROUTER, Holder
-from engage_hri.schemas.limits import BESIDE, LARGEST, MOST_PULSES, most
+from engage_hri.schemas.access import BESIDE, LARGEST, MOST_PULSES, OWN, ROUTER, Holder, most
 
 MOST_IN_PARTS = LARGEST + 2 * BESIDE
 """Bytes of a message that Zenoh puts together again; it drops a longer one in the middle, and the link stays."""

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any, NamedTuple
 
-from engage_hri.schemas.limits import LOUD, LOUD_ROBOT
+from engage_hri.schemas.access import LOUD, LOUD_ROBOT
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.zenoh.crowd import Link
 

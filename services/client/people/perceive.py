@@ -14,7 +14,7 @@ from contextlib import AsyncExitStack, asynccontextmanager
 
 from engage_hri.schemas import keys as bus_keys
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
-from engage_hri.schemas.presence import PeerAlive
+from engage_hri.schemas.participants import PeerAlive
 from engage_hri.schemas.units import Seconds, Vector
 from engage_hri.services.bus.config import Mode
 from engage_hri.services.bus.interface import Bus, Hub, Subscription

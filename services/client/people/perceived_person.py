@@ -11,20 +11,25 @@ from msgspec import Meta
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.advice import suggestion
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import LONGEST_ID, LONGEST_TEXT, Utterance
-from engage_hri.schemas.suggestion import suggestion
+from engage_hri.schemas.text import is_utf8
 from engage_hri.schemas.units import A_DAY, Seconds, Stamp, Vector
-from engage_hri.schemas.utf8 import is_utf8
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.client.inputs import taken
-from engage_hri.services.client.people.perceived_actions import PerceivedActions
-from engage_hri.services.client.people.person_actions import PersonActions
+from engage_hri.services.client.people.actions import (
+    RECOGNIZING,
+    PersonActions,
+    Utterances,
+    partial_texts,
+    speaking_time,
+)
 from engage_hri.services.client.people.shared_world import SharedWorld
-from engage_hri.services.client.people.utterances import RECOGNIZING, Utterances, partial_texts, speaking_time
-from engage_hri.services.reports.ongoing_actions import ActionEvent
+from engage_hri.services.reports.ongoing_actions import ActionEvent, OngoingActionTracker
 
 Duration = Annotated[float, Meta(ge=0.0, le=A_DAY)]
 """Seconds that something takes."""
@@ -424,3 +429,38 @@ def not_a_thing(person: str, world: World) -> None:
 def _seat(number: int) -> Vector:
     side = (number + 1) // 2 * BESIDE * (-1 if number % 2 else 1)
     return (SEAT[0], SEAT[1] + side, SEAT[2])
+
+
+class PerceivedActions:
+    """The actions of people that one participant perceives.
+
+        perceived = PerceivedActions(bus)
+        perceived.tell(ActorFound(actor="ann", at=bus.stamp()))
+        perceived.tell(ActionBegan(actor="ann", action="look", targets=("robot",), at=bus.stamp()))
+
+    bus: its view of the bus; its name is the reporter's.
+    """
+
+    def __init__(self, bus: Bus) -> None:
+        self._bus = bus
+        self._tracker = OngoingActionTracker()
+
+    def tell(self, *events: ActionEvent) -> None:
+        """Publish what has begun and ended, and what goes on after it. Events of one instant belong in one call.
+
+        events: in their order, that of their stamps for each person.
+        """
+        for event in events:
+            self._bus.publish(keys.PERCEIVED_ACTION, event)
+        self.follow(events)
+
+    def follow(self, published: Iterable[Message]) -> None:
+        """Publish what goes on after events that have been published already.
+
+        published: other messages among them are ignored.
+        """
+        for state in self._tracker.feed(published, self._bus.stamp()):
+            if keys.is_chunk(state.actor):
+                self._bus.publish(keys.perceived_ongoing(self._bus.name, state.actor), state)
+        forgotten = self._tracker.forget(self._bus.now())
+        self._bus.withdraw(*(keys.perceived_ongoing(self._bus.name, actor) for actor in forgotten))

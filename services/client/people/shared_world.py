@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Iterable
 
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 

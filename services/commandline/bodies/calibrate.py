@@ -9,8 +9,8 @@ import msgspec
 import typer
 
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.text import utf8
 from engage_hri.schemas.units import Vector
-from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.world import Entity
 from engage_hri.services.commandline.shell.options import Configured
 from engage_hri.services.commandline.shell.process import DONE, run, typed

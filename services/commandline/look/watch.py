@@ -6,15 +6,13 @@ from typing import Annotated, NamedTuple, get_args
 
 import typer
 
-from engage_hri.schemas import keys, lines
-from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.blocks import BlockProgress, BodyHeld, Held, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.body_faults import BodyFaults
-from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
-from engage_hri.schemas.holds import BodyHeld, Held
-from engage_hri.schemas.messages import Message
+from engage_hri.schemas.fragments import HeadOwner, StudyCondition
+from engage_hri.schemas.messages import Message, line
 from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
@@ -154,6 +152,6 @@ async def _watch(options: Options, config: RobotConfig, wanted: Wanted, out: Pat
 
 def _as_json(out: Patient) -> Sink:
     def show(message: Message, at: Seconds) -> None:
-        out.write(f"{lines.line(message)}\n")
+        out.write(f"{line(message)}\n")
 
     return show

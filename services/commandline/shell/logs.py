@@ -15,8 +15,8 @@ from typing import Any
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.text import printable
 from engage_hri.schemas.units import Seconds
-from engage_hri.schemas.utf8 import printable
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.often import Often
 from engage_hri.services.commandline.shell.failing_output import Patient, without_waiting

@@ -15,7 +15,7 @@ import typer
 from msgspec import json
 
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.utf8 import is_utf8
+from engage_hri.schemas.text import is_utf8
 
 if TYPE_CHECKING:
     from engage_hri.services.bus.config import BusConfig

@@ -9,10 +9,9 @@ from typing import Any, Self
 import msgspec
 from rich.console import Console
 
-from engage_hri.schemas import lines
+from engage_hri.schemas.blocks import BlockProgress, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
-from engage_hri.schemas.messages import Message
+from engage_hri.schemas.messages import Message, line
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.summary import Summary
 from engage_hri.schemas.units import Seconds
@@ -106,4 +105,4 @@ class Outputs:
 
     def _write(self, file: Patient | None, message: Message) -> None:
         if file is not None and self.wanted(message):
-            file.write(f"{lines.line(message)}\n")
+            file.write(f"{line(message)}\n")

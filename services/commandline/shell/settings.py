@@ -2,9 +2,8 @@
 
 from msgspec import Struct
 
-from engage_hri.schemas.covered import COVERED_FOR
-from engage_hri.schemas.ranges import not_negative
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Seconds, not_negative
+from engage_hri.schemas.world import COVERED_FOR
 from engage_hri.services.bus.config import BusConfig
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.generation.config import GenerationConfig

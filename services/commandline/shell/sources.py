@@ -13,7 +13,7 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents import json_codec
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.syncref import is_id
+from engage_hri.schemas.references import is_id
 from engage_hri.schemas.world import World
 from engage_hri.services.runtime.service import Service
 

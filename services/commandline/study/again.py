@@ -13,9 +13,9 @@ from msgspec import Struct, structs
 from rich.console import Console
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.explained import explained
+from engage_hri.schemas.advice import explained
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.ledger import Step, Taken
+from engage_hri.schemas.participants import Step, Taken
 from engage_hri.schemas.recognition import ConnectionEvent, session_of
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.samples import Received

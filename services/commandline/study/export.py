@@ -87,8 +87,8 @@ def _made(name: str, path: Path, recording: "Recording", options: Options) -> by
 
 def lines_of(recording: "Recording") -> str:
     """The messages that have a line, as `engage watch --json` would have printed them."""
-    from engage_hri.schemas import lines
+    from engage_hri.schemas.messages import line
     from engage_hri.services.recording.times import messages
 
-    told = (lines.line(received.message) for received, _ in messages(recording) if not received.past)
+    told = (line(received.message) for received, _ in messages(recording) if not received.past)
     return "".join(f"{line}\n" for line in told if line is not None)

@@ -20,13 +20,12 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
+from engage_hri.schemas.blocks import PredictionFeedback, SyncPointProgress
 from engage_hri.schemas.body import EstimateBehaviors, PerformBehavior
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.feedback import PredictionFeedback, SyncPointProgress
-from engage_hri.schemas.ledger import Step
 from engage_hri.schemas.messages import Message, in_form
+from engage_hri.schemas.participants import BusHealth, Step
 from engage_hri.schemas.requests import KeepAlive
-from engage_hri.schemas.status import BusHealth
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Answer, Bus, Subscription, Tap
 from engage_hri.services.bus.samples import Received

@@ -3,12 +3,10 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.blocks import Block, WarningFeedback, WarningKind
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.feedback import WarningFeedback, WarningKind
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.references import sites
-from engage_hri.schemas.syncref import SyncRef
+from engage_hri.schemas.references import SyncRef, sites
 from engage_hri.schemas.world import World
 from engage_hri.services.commandline.shell.exit_codes import readable
 from engage_hri.services.commandline.shell.outputs import Outputs

@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 from rich.cells import cell_len, set_cell_size
 
-from engage_hri.schemas.utf8 import printable
-from engage_hri.services.console.net_layout import BLOCK, REST, laid_out
-from engage_hri.services.console.nets import NetInView
+from engage_hri.schemas.text import printable
+from engage_hri.services.console.nets import BLOCK, REST, NetInView, laid_out
 from engage_hri.services.console.web.sections import NetRow, NetShown
 from engage_hri.services.console.wording import number
 

@@ -15,7 +15,7 @@ from engage_hri.schemas.blocks import Block, BlockOutcome
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply, RunFailed
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.status import AskStatus
+from engage_hri.schemas.participants import AskStatus
 from engage_hri.schemas.units import A_DAY, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Hub

@@ -4,8 +4,14 @@ import asyncio
 from collections.abc import Iterable
 
 from engage_hri.schemas.behaviors import Event
-from engage_hri.schemas.blocks import Block, BlockOutcome
-from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
+from engage_hri.schemas.blocks import (
+    Block,
+    BlockOutcome,
+    BlockProgress,
+    PredictionFeedback,
+    SyncPointProgress,
+    WarningFeedback,
+)
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import Utterance

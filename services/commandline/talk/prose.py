@@ -6,15 +6,15 @@ from collections.abc import Callable
 from msgspec.structs import replace
 from rich.console import Console
 
+from engage_hri.schemas.blocks import BlockProgress, WarningFeedback
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.feedback import BlockProgress, WarningFeedback
 from engage_hri.schemas.fragments import FragmentOutcome, HeardText
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.summary import summary
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.client.hearing import NewWords
+from engage_hri.services.client.robot import NewWords
 from engage_hri.services.commandline.shell.outputs import Outputs
 from engage_hri.services.console import wording
 

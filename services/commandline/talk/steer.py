@@ -5,8 +5,8 @@ from typing import Annotated, Literal
 
 import typer
 
-from engage_hri.schemas.conditions import LONGEST_NAME, words
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.fragments import LONGEST_NAME, condition_words
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.client.robot import Robot
 from engage_hri.services.commandline.shell.options import Connected
@@ -90,4 +90,4 @@ async def _condition(options: Options, robot: Robot) -> str:
         return f"{now.sentence}, for {robot.now() - robot.local(now.at):.0f} s"
     name = "" if options.name == NONE else options.name
     await robot.set_condition(name, speech_only=options.speech_only, by=options.by, timeout=PATIENCE)
-    return f"condition of the study, from now on: {words(name, options.speech_only)}"
+    return f"condition of the study, from now on: {condition_words(name, options.speech_only)}"

@@ -7,8 +7,8 @@ from rich.console import Console, RenderableType
 from rich.live import Live
 
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.text import printable
 from engage_hri.schemas.units import Seconds
-from engage_hri.schemas.utf8 import printable
 from engage_hri.services.console import nets, view, wording
 from engage_hri.services.console.terminal import log, tally
 from engage_hri.services.console.terminal.render import render

@@ -4,16 +4,13 @@ from collections.abc import Iterator
 
 from msgspec import Struct
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.blocks import BlockProgress, BodyHeld, Held, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.body_faults import BodyFaults, words
-from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress, WarningFeedback
-from engage_hri.schemas.holds import BodyHeld, Held
+from engage_hri.schemas.fragments import HeadOwner, StudyCondition
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import Utterance
-from engage_hri.schemas.presence import PeerGone
+from engage_hri.schemas.participants import PeerGone
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, Utterance
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console import wording

@@ -6,7 +6,7 @@ from rich.table import Table
 from rich.text import Text
 
 from engage_hri.schemas.body_faults import words
-from engage_hri.schemas.utf8 import printable
+from engage_hri.schemas.text import printable
 from engage_hri.services.console import wording
 from engage_hri.services.console.view import Actor, EventInView, Scene
 
@@ -62,7 +62,7 @@ def _style(scene: Scene, actor: str) -> str:
 def _people(scene: Scene) -> list[Text]:
     """Lines for all actors, the robot first, then one for the owner of its head, and one for the faults that are on
     and for what is held."""
-    actors = sorted(scene.actors, key=lambda actor: actor.id != scene.robot)
+    actors = sorted(scene.actors.values(), key=lambda actor: actor.id != scene.robot)
     wide = max((len(printable(actor.id)) for actor in actors), default=0)
     lines = [
         Text(printable(actor.id).ljust(wide) + " ", style=_style(scene, actor.id)) + _doing(scene, actor)

@@ -1,6 +1,6 @@
 """Numbers at the end of a session: events of each kind with outcome and delays, MTBCE, duration."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -10,13 +10,12 @@ from rich.table import Table
 from rich.text import Text
 
 from engage_hri.schemas.behaviors import EventKind
-from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.schemas.blocks import BlockProgress
 from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console import wording
-from engage_hri.services.console.shelf import Shelf
 
 
 class Counted(Struct, frozen=True, kw_only=True):
@@ -41,7 +40,7 @@ class Tally(Struct, frozen=True, kw_only=True):
 
     began: Seconds
     now: Seconds
-    events: Shelf[str, ConnectionEvent] = Shelf()
+    events: Mapping[str, ConnectionEvent] = {}
     session: WindowStatistics | None = None
     fragments: int = 0
     unfinished: int = 0
@@ -65,7 +64,7 @@ def feed(tally: Tally, message: Message, at: Seconds) -> Tally:
             before = (tally.events.get(message.id) or message).state
             if message.state in ("completed", "lost") and before not in ("started", message.state):
                 return tally  # its decision is what counts
-            return replace(tally, events=tally.events.put(message.id, message))
+            return replace(tally, events={**tally.events, message.id: message})
         case Statistics(actor="", session=session):
             return replace(tally, session=session)
         case FragmentOutcome(status=status):
@@ -78,7 +77,7 @@ def feed(tally: Tally, message: Message, at: Seconds) -> Tally:
 
 def count(tally: Tally, kind: EventKind, initiator: str | None, robot: str) -> Counted:
     """Count the events of one kind that the robot began, or people (initiator None)."""
-    of_kind = [e for e in tally.events if e.kind == kind and (e.initiator == robot) == (initiator == robot)]
+    of_kind = [e for e in tally.events.values() if e.kind == kind and (e.initiator == robot) == (initiator == robot)]
     succeeded = [event for event in of_kind if event.state in ("succeeded", "completed")]
     failed = [event.optional for event in of_kind if event.state == "failed"]
     is_open = sum(event.state == "started" for event in of_kind)

@@ -1,11 +1,84 @@
-"""Frames: what a browser gets next, which is all that has changed since the last one that it drew. Pure."""
+"""Frames, receipts and messages: what a page or a program gets next. Pure.
 
+A frame is all that has changed since the last one that a browser drew.
+
+A receipt is what the window and one of its pages know of the page's orders, whichever links break between them. The
+page numbers its orders as it sends them: 1, 2, 3... The window takes each number once, and none before the one that
+precedes it, and tells which it took last. So a page whose link was cut learns from the first frame of the next one
+which orders arrived, and sends exactly the others. News of orders are told again until a frame with them was drawn.
+
+A program gets messages as JSON: the newest of them, if it is slow.
+"""
+
+from collections import deque
+from collections.abc import Collection
+
+import msgspec
 from msgspec import Raw, Struct
 from msgspec.json import Encoder
 
+from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.console.web.orders import Panel
 from engage_hri.services.console.web.picture import Picture
-from engage_hri.services.console.web.receipts import OrderNews, Receipts
+
+NEWS_KEPT = 1000
+"""Number of news that wait for a page that draws nothing; it may give no more orders then."""
+
+
+class OrderNews(Struct, frozen=True, omit_defaults=True):
+    """News of an order for who gave it. number: of the news; a page that has seen it does not show it again.
+
+    refused: number of the order that was not done for the reason in `text`; 0: none was refused.
+    """
+
+    number: int
+    panel: Panel
+    text: str
+    refused: int = 0
+
+
+class Receipts:
+    """Receipts for one page. session: their id; a page that comes back with it has its orders counted on.
+
+    taken: number of the last order that was taken.
+    """
+
+    def __init__(self, session: str = "") -> None:
+        self.session = session
+        self.taken = 0
+        self._news: deque[OrderNews] = deque()
+        self._told = 0
+        """Number of the last news."""
+        self._shown = 0
+        """Number of the last news that was in a frame."""
+
+    @property
+    def is_full(self) -> bool:
+        """True while the page has to draw news before it may give more orders."""
+        return len(self._news) >= NEWS_KEPT
+
+    def take(self, number: int) -> bool:
+        """Take an order by its number. Returns whether it is to be carried out: it was not taken before."""
+        is_next = number == self.taken + 1
+        self.taken += is_next
+        return is_next
+
+    def tell(self, panel: Panel, text: str, *, refused: int = 0) -> None:
+        """Tell the page something about an order. refused: the number of one that is not done."""
+        self._told += 1
+        self._news.append(OrderNews(self._told, panel, text, refused))
+
+    def news(self) -> tuple[OrderNews, ...]:
+        """All news for the next frame: those of which it is not known that they were drawn."""
+        self._shown = self._told
+        return tuple(self._news)
+
+    def confirm(self) -> None:
+        """Take note that the last frame was drawn."""
+        while self._news and self._news[0].number <= self._shown:
+            self._news.popleft()
+
 
 HEARTBEAT: Seconds = 1.0
 """Time after which a browser gets a frame though nothing has changed, so that it knows that the window is there."""
@@ -108,3 +181,37 @@ class Viewer:
         sections = {name: Raw(picture.section(name)) for name in new}
         news, self._you = (you if you != self._you else None), you
         return self._encoder.encode(PageFrame(picture.zero(now), sections, gone, session, taken, news, told, place))
+
+
+MESSAGES_KEPT = 1000
+"""Number of messages that wait; the oldest are dropped for those that come after."""
+
+
+class Outbox:
+    """Messages for one program. only: their types, such as `connection_event`; empty: all."""
+
+    def __init__(self, only: Collection[str] = ()) -> None:
+        self._only = frozenset(only)
+        self._waiting: deque[str] = deque()
+        self._dropped = 0
+
+    def put(self, message: Message) -> bool:
+        """Take a message. Returns True if it now waits for the program."""
+        if self._only and message.__struct_config__.tag not in self._only:
+            return False
+        if len(self._waiting) == MESSAGES_KEPT:
+            self._waiting.popleft()
+            self._dropped += 1
+        self._waiting.append(msgspec.json.encode(message).decode())
+        return True
+
+    def take(self) -> list[str]:
+        """Give out what waits, in order. If some were dropped, their number comes first."""
+        taken, self._waiting = [*self._waiting], deque()
+        dropped, self._dropped = self._dropped, 0
+        return [msgspec.json.encode({"type": "dropped", "count": dropped}).decode(), *taken] if dropped else taken
+
+
+def message_types() -> frozenset[str]:
+    """All types that a message may have."""
+    return frozenset(kind.__struct_config__.tag for kind in Message.__args__)

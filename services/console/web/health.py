@@ -1,8 +1,7 @@
 """Health of each participant of the bus: whether it is there, what it says of itself, what is wrong. Pure."""
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.presence import PeerAlive, PeerGone, is_claim
-from engage_hri.schemas.status import Status
+from engage_hri.schemas.participants import PeerAlive, PeerGone, Status, is_claim
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.web.sections import Health
 

@@ -1,10 +1,10 @@
 """Target of the robot's looks and the reason for them, in words that everybody understands. Pure.
 
-The arbiter of the head speaks of claims, of which one owns the head (`schemas/attention.py`). Researchers find that
+The arbiter of the head speaks of claims, of which one owns the head (`schemas/fragments.py`). Researchers find that
 beside these words.
 """
 
-from engage_hri.schemas.attention import Claim, ClaimKind
+from engage_hri.schemas.fragments import Claim, ClaimKind
 from engage_hri.schemas.world import World
 from engage_hri.services.console.web.scene import label
 from engage_hri.services.console.web.sections import ClaimShown

@@ -10,12 +10,13 @@ import msgspec
 from msgspec import Meta, Struct
 
 from engage_hri.schemas.body_faults import BodyFault
-from engage_hri.schemas.conditions import words
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.fragments import condition_words
 from engage_hri.schemas.perception import LONGEST_TEXT
 from engage_hri.schemas.units import Coordinate
-from engage_hri.services.console.web.receipts import Panel
 
+Panel = Literal["part", "wizard", "player"]
+"""Panel in which an order was given: the seat, the robot by hand, or the bar of a recording."""
 Right = Literal["seat", "speak", "steer", "faults", "condition"]
 ALL_RIGHTS: tuple[Right, ...] = ("seat", "speak", "steer", "faults", "condition")
 RIGHTS: dict[str, tuple[Right, ...]] = {
@@ -272,7 +273,7 @@ def written(order: PageOrder) -> str:
         case InhibitGaze(on=on, mode=mode, target=target):
             return f"keeps the gaze {GAZE[mode]}{target}" if on else "lets the gaze go"
         case ConditionOrder(name=name, speech_only=speech_only):
-            return f"condition: {words(name, speech_only)}"
+            return f"condition: {condition_words(name, speech_only)}"
         case SteerOrder(to=to):
             return to
         case SwitchOrder(fault=fault, off=off):

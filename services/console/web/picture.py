@@ -12,28 +12,31 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.attention import HeadOwner
+from engage_hri.schemas.blocks import (
+    BlockProgress,
+    Held,
+    NetMarked,
+    NetPlanned,
+    NetWaiting,
+    PredictionFeedback,
+    SyncPointProgress,
+    WarningFeedback,
+)
 from engage_hri.schemas.body import Capabilities, RobotState
 from engage_hri.schemas.body_faults import BodyFaults, words
-from engage_hri.schemas.conditions import StudyCondition
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
-from engage_hri.schemas.fragments import FragmentOutcome
-from engage_hri.schemas.holds import Held
+from engage_hri.schemas.fragments import FragmentOutcome, HeadOwner, StudyCondition
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.nets import NetMarked, NetPlanned, NetWaiting
-from engage_hri.schemas.presence import PeerAlive, PeerGone, is_claim
+from engage_hri.schemas.participants import PeerAlive, PeerGone, Status, is_claim
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
-from engage_hri.schemas.status import Status
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.console import net_layout, nets, view, wording
+from engage_hri.services.console import nets, view, wording
 from engage_hri.services.console.web import scene
 from engage_hri.services.console.web.health import HealthBoard
-from engage_hri.services.console.web.lanes import BlockLanes, EventLanes
+from engage_hri.services.console.web.lanes import BlockLanes, EventLanes, Measures
 from engage_hri.services.console.web.looking import plainly
-from engage_hri.services.console.web.measures import Measures
 from engage_hri.services.console.web.sections import Choice, HeadSection, Note, Switched, UtteranceShown
 from engage_hri.services.console.web.turns import ShownTurns
 from engage_hri.services.runtime.absent import Acquaintances
@@ -103,7 +106,7 @@ class Picture:
     @property
     def present(self) -> tuple[str, ...]:
         """Ids of the people who are there, and have a place."""
-        gone = {each.id for each in self._scene.actors if not each.present}
+        gone = {each.id for each in self._scene.actors.values() if not each.present}
         return tuple(each.id for each in self.world.people if each.id not in gone)
 
     @property
@@ -316,7 +319,7 @@ class Picture:
         if name.startswith(BLOCK):
             return self._blocks.shown(name.removeprefix(BLOCK), self.zero)
         if name.startswith(NET):
-            return net_layout.laid_out(self._nets[name.removeprefix(NET)], self.zero)
+            return nets.laid_out(self._nets[name.removeprefix(NET)], self.zero)
         if name.startswith(MEASURES):
             return self._measures.shown(name.removeprefix(MEASURES), self.zero)
         made: dict[str, Callable[[], Any]] = {
@@ -325,7 +328,7 @@ class Picture:
             "head": self._head,
             "events": lambda: self._events.shown(self.zero),
             "nets": lambda: list(self._nets),
-            "tokens": lambda: [net_layout.tokens(net) for net in self._nets.values()],
+            "tokens": lambda: [nets.tokens(net) for net in self._nets.values()],
             "delays": lambda: self._measures.delays(self.zero),
             "references": lambda: list(self._choices),
             "health": self._health.shown,

@@ -1,10 +1,20 @@
-"""The scene in space: the world as perception tells it, the robot's body, and who does what. Pure."""
+"""The scene in space: the world as perception tells it, the robot's body, and who does what. Pure.
+
+It is seen from above as the person opposite the robot sees it: the robot is at the top, and its left is on the right.
+Where somebody drops a piece in it, the piece is laid at the neighbor whose edge it nearly touches, as a hand would.
+"""
+
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from msgspec.structs import replace
 
 from engage_hri.schemas.body import Capabilities, RobotState
-from engage_hri.schemas.units import Radians, Vector
+from engage_hri.schemas.footprints import SIDES, corners, overlap, poses_touching
+from engage_hri.schemas.units import Meters, Radians, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.console.view import Actor, Scene
-from engage_hri.services.console.web import above
 from engage_hri.services.console.web.sections import Above, Arm, BodyShown, PersonShown, SceneSection, Thing
 
 HALF_ANGLE: Radians = 0.1
@@ -15,15 +25,15 @@ def section(scene: Scene, world: World | None, state: RobotState | None, body: C
     """Everything that is seen in space. world, state, body: None: nothing was told of it yet."""
     entities = world.entities if world is not None else ()
     people = {entity.id: entity.position for entity in entities if entity.kind == "person"}
-    actors = [actor.id for actor in scene.actors if actor.id != scene.robot and actor.present]
+    actors = [actor.id for actor in scene.actors.values() if actor.id != scene.robot and actor.present]
     shown = tuple(_person(scene.actor(id), people.get(id)) for id in dict.fromkeys((*people, *actors)))
-    edges = above.frame(entities, [each.at for each in shown if each.at is not None and each.present])
+    edges = _frame(entities, [each.at for each in shown if each.at is not None and each.present])
     return SceneSection(
         robot=scene.robot,
         body=_body(state, scene.actor(scene.robot), body) if state is not None else None,
         things=tuple(_thing(entity) for entity in entities if entity.kind != "person"),
         people=shown,
-        above=Above(above.RIGHT, above.DOWN, above.PictureEdges(*map(_short, edges))),
+        above=Above(RIGHT, DOWN, PictureEdges(*map(_short, edges))),
     )
 
 
@@ -33,7 +43,7 @@ def label(entity: Entity) -> str:
 
 
 def _thing(entity: Entity) -> Thing:
-    outline = [(_short(x), _short(y)) for x, y in above.outline(entity)]
+    outline = [(_short(x), _short(y)) for x, y in corners(entity)]
     return Thing(
         entity.id, entity.kind, _place(entity.position), _short(entity.yaw), tuple(outline), _short(entity.radius),
         entity.color, label(entity), entity.owner,
@@ -79,3 +89,95 @@ def _place(vector: Vector) -> Vector:
 def _short(number: float) -> float:
     """A number to a tenth of a millimetre: more is not seen, and costs the way to the browser."""
     return round(number, 4)
+
+
+RIGHT = (0.0, 1.0)
+"""Part that the robot's x and y have in what is to the right in the picture."""
+DOWN = (1.0, 0.0)
+"""Part that they have in what is down in the picture."""
+ROOM: Meters = 0.3
+"""Room around a person, for the body and the name."""
+STEP: Meters = 0.05
+"""Steps of the edges, so that these stand still while somebody moves a little."""
+
+
+class PictureEdges(NamedTuple):
+    """Edges of the picture, in metres to the right and down from the robot."""
+
+    left: Meters
+    top: Meters
+    right: Meters
+    bottom: Meters
+
+
+LEAST = PictureEdges(-0.62, -0.27, 0.62, 1.5)
+"""What is in view at least."""
+
+
+def seen(x: Meters, y: Meters) -> tuple[Meters, Meters]:
+    """Place in the picture, to the right and down, of a place before the robot."""
+    return (RIGHT[0] * x + RIGHT[1] * y, DOWN[0] * x + DOWN[1] * y)
+
+
+def _frame(entities: Iterable[Entity], people: Iterable[Vector]) -> PictureEdges:
+    """Frame with everybody and everything: a second person sits beside the table, another world may be wider.
+
+    people: places of those who are there. entities: hands and people among them do not count.
+    """
+    things = [each for each in entities if each.kind not in ("hand", "person")]
+    ends = [corner for each in things for corner in (corners(each) or [each.position[:2]])]
+    places = [seen(x, y) for x, y in ends]
+    places += [
+        (right + ROOM * side, down + ROOM * front)
+        for right, down in (seen(x, y) for x, y, _ in people)
+        for side, front in ((-1, 0), (1, 0), (0, 1))
+    ]
+    steps = [(_up(-right), _up(right), _up(down)) for right, down in places]
+    return PictureEdges(
+        left=min([LEAST.left, *(-left for left, _, _ in steps)]),
+        top=LEAST.top,
+        right=max([LEAST.right, *(right for _, right, _ in steps)]),
+        bottom=max([LEAST.bottom, *(down for _, _, down in steps)]),
+    )
+
+
+def _up(value: Meters) -> Meters:
+    return math.ceil(round(value / STEP, 6)) * STEP
+
+
+NEAR: Meters = 0.045
+"""Distance from where a piece is dropped to where it touches another, below which it is laid there."""
+
+
+def laid(world: World, thing: str, x: Meters, y: Meters) -> Entity | None:
+    """The thing as it lies after it was dropped at a place of its surface; None: the world has no such object."""
+    piece = world.entity(thing)
+    if piece is None or piece.kind != "object":
+        return None
+    place: Vector = (x, y, piece.position[2])
+    dropped = replace(piece, position=_on_surface(world, place))
+    others = [each for each in world.objects if each.id != thing and each.footprint]
+    best: tuple[float, Entity] | None = None
+    for other in others if piece.footprint else ():
+        for side in SIDES:
+            for pose in poses_touching(dropped, other, side):
+                far = math.dist((pose.x, pose.y), (x, y))
+                there = replace(dropped, position=(pose.x, pose.y, place[2]), yaw=math.radians(pose.yaw))
+                if (
+                    far < NEAR
+                    and (best is None or far < best[0])
+                    and not any(overlap(there, each) for each in others)
+                ):
+                    best = (far, there)
+    return dropped if best is None else best[1]
+
+
+def _on_surface(world: World, place: Vector) -> Vector:
+    """The place, or the nearest one on the surface that is at its height."""
+    x, y, z = place
+    for surface in world.entities:
+        if surface.kind == "surface" and surface.footprint and abs(surface.position[2] - z) < 0.1:
+            xs = [surface.position[0] + corner[0] for corner in surface.footprint]
+            ys = [surface.position[1] + corner[1] for corner in surface.footprint]
+            return (min(max(x, min(xs)), max(xs)), min(max(y, min(ys)), max(ys)), z)
+    return place

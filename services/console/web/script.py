@@ -10,7 +10,7 @@ from engage_hri.schemas.behaviors import Reference, Speech
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import with_names
-from engage_hri.schemas.speakable import joined
+from engage_hri.schemas.text import joined
 from engage_hri.schemas.tool import Part, Refer
 
 Thing = Block | TurnFragment

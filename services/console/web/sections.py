@@ -4,6 +4,7 @@ A section is replaced as a whole when something in it has changed. Instants are 
 metres, in the frame of the robot.
 """
 
+from collections.abc import Callable
 from typing import Literal
 
 from msgspec import Struct
@@ -14,6 +15,8 @@ from engage_hri.schemas.recognition import EventState
 from engage_hri.schemas.units import Meters, Radians, Seconds, Vector
 
 Point = tuple[float, float]
+Zero = Callable[[Seconds], Seconds]
+"""Conversion of an instant to seconds of the picture."""
 Level = Literal["engaged", "weakening", "disengaged", "unknown"]
 
 

@@ -25,11 +25,9 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.web import orders
-from engage_hri.services.console.web.frames import Viewer, You
+from engage_hri.services.console.web.frames import Outbox, Receipts, Viewer, You, message_types
 from engage_hri.services.console.web.guard import App, Guarded, Hosts
-from engage_hri.services.console.web.outbox import Outbox, types
 from engage_hri.services.console.web.played import PlayedPicture
-from engage_hri.services.console.web.receipts import Receipts
 from engage_hri.services.console.web.service import WindowServer
 from engage_hri.services.console.web.sessions import CLOSED, PageSession, Sessions
 from engage_hri.services.console.web.visitor import Visitor
@@ -99,7 +97,7 @@ def application(window: WindowServer, hosts: Hosts, token: str, pages: Path | No
     async def messages(program: WebSocket) -> None:
         only = frozenset(filter(None, program.query_params.get("only", "").split(",")))
         await program.accept()  # who is refused before learns no reason
-        if unknown := sorted(only - types()):
+        if unknown := sorted(only - message_types()):
             await program.close(4400, f"there is no message of type {unknown[0]!r}"[:120])
         elif len(window.listeners) >= MOST_PROGRAMS:
             await program.close(FULL, f"{MOST_PROGRAMS} programs listen already")

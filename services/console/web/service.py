@@ -9,21 +9,19 @@ from contextlib import asynccontextmanager
 from itertools import count
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import OngoingActions
 from engage_hri.schemas.body import Capabilities, DescribeBody
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.presence import PeerAlive, PeerGone
-from engage_hri.schemas.status import AskStatus, Status
+from engage_hri.schemas.participants import AskStatus, PeerAlive, PeerGone, Status
+from engage_hri.schemas.perception import OngoingActions
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Hub, Subscription
 from engage_hri.services.client.robot import Robot
 from engage_hri.services.console.follow import FOLLOWED, following
-from engage_hri.services.console.web.company import Invitation, invitation
 from engage_hri.services.console.web.health import NOTABLE
 from engage_hri.services.console.web.picture import Picture
 from engage_hri.services.console.web.script import Script
-from engage_hri.services.console.web.seats import Seats
+from engage_hri.services.console.web.seats import Invitation, Seats, invitation
 
 PATTERNS = (
     *FOLLOWED, keys.ANY_ALIVE, keys.WORLD, keys.ROBOT_STATE, keys.ROBOT_MOTION, keys.NET, keys.ROBOT_ONGOING,

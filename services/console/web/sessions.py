@@ -10,9 +10,8 @@ from collections.abc import Callable
 from typing import Protocol
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.console.web.frames import Viewer
+from engage_hri.services.console.web.frames import Receipts, Viewer
 from engage_hri.services.console.web.orders import Given
-from engage_hri.services.console.web.receipts import Receipts
 
 KEPT: Seconds = 20.0
 """Time that a page has to come back after its link broke."""

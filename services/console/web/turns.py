@@ -9,18 +9,14 @@ from collections.abc import Collection, Iterable
 from itertools import groupby
 from typing import Literal, NamedTuple
 
-from engage_hri.schemas.blocks import BlockOutcome
+from engage_hri.schemas.blocks import BlockOutcome, BlockProgress, Hold, NetPlanned
 from engage_hri.schemas.body import WordSpoken
-from engage_hri.schemas.feedback import BlockProgress
-from engage_hri.schemas.holds import Hold
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.nets import NetPlanned
-from engage_hri.schemas.presence import PeerAlive, PeerGone
-from engage_hri.schemas.speakable import joined
+from engage_hri.schemas.participants import PeerAlive, PeerGone
+from engage_hri.schemas.text import joined
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.view import OWN_BLOCKS, UtteranceInView
-from engage_hri.services.console.web.lanes import Zero
-from engage_hri.services.console.web.sections import Left, UtteranceShown
+from engage_hri.services.console.web.sections import Left, UtteranceShown, Zero
 
 TURNS_KEPT = 30
 BLOCKS_KEPT = 160

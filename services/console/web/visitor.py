@@ -19,11 +19,10 @@ from engage_hri.services.client.inputs import fragment_in
 from engage_hri.services.client.people.perceive import check_id, perceive
 from engage_hri.services.client.people.perceived_person import PerceivedPerson, free_seat, not_a_thing
 from engage_hri.services.console.web import orders, script
-from engage_hri.services.console.web.company import Invitation
-from engage_hri.services.console.web.frames import Viewer, You
-from engage_hri.services.console.web.laying import laid
-from engage_hri.services.console.web.receipts import Panel, Receipts
-from engage_hri.services.console.web.seats import SETTLED
+from engage_hri.services.console.web.frames import Receipts, Viewer, You
+from engage_hri.services.console.web.orders import Panel
+from engage_hri.services.console.web.scene import laid
+from engage_hri.services.console.web.seats import SETTLED, Invitation
 from engage_hri.services.console.web.service import WindowServer
 from engage_hri.services.text.pieces import Ids
 

@@ -23,7 +23,7 @@ import msgspec
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.explained import explained
+from engage_hri.schemas.advice import explained
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.services.control.bases.composed import Member, composed
 from engage_hri.services.control.bases.driver_guard import GuardedBody

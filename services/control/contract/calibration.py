@@ -21,8 +21,8 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.body import Estimate, Ray
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.text import utf8
 from engage_hri.schemas.units import Degrees, Radians
-from engage_hri.schemas.utf8 import utf8
 from engage_hri.services.control.contract.extras import Extras
 
 PARTS = ("head", "left_arm", "right_arm")

@@ -4,10 +4,10 @@ import math
 from collections.abc import Iterable
 
 from engage_hri.schemas.behaviors import BlockBehavior, Pointing
+from engage_hri.schemas.blocks import WarningKind
 from engage_hri.schemas.body import Capabilities, Estimate, NoPointZone
 from engage_hri.schemas.check import check_behavior
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.world import World
 

@@ -10,6 +10,8 @@ from math import radians
 
 from msgspec.structs import replace
 
+from engage_hri.schemas.advice import suggestion
+from engage_hri.schemas.behavior_types import SYNC_POINTS
 from engage_hri.schemas.behaviors import (
     BlockBehavior,
     Face,
@@ -29,8 +31,6 @@ from engage_hri.schemas.behaviors import (
     Wait,
     posed,
 )
-from engage_hri.schemas.suggestion import suggestion
-from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.units import Degrees, Seconds
 from engage_hri.schemas.vocabulary import normal
 from engage_hri.schemas.world import Entity, World

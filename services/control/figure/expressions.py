@@ -7,6 +7,7 @@ from math import radians
 
 from msgspec.structs import replace
 
+from engage_hri.schemas.behavior_types import SYNC_POINTS
 from engage_hri.schemas.behaviors import (
     Face,
     FaceFacs,
@@ -17,7 +18,6 @@ from engage_hri.schemas.behaviors import (
     PartPose,
     expressed,
 )
-from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import kinematics

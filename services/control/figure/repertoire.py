@@ -19,8 +19,8 @@ from msgspec import Meta, Struct
 
 from engage_hri.schemas.behaviors import Hand
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.text import utf8
 from engage_hri.schemas.units import Degrees
-from engage_hri.schemas.utf8 import utf8
 from engage_hri.schemas.vocabulary import is_defined, normal
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.figure import kinematics

@@ -4,7 +4,7 @@ from functools import cache
 
 from msgspec import Struct
 
-from engage_hri.schemas.syncref import SYNC_POINTS
+from engage_hri.schemas.behavior_types import SYNC_POINTS
 
 
 class WalkPoint(Struct, frozen=True):

@@ -29,11 +29,22 @@ What went wrong where each of them decided for itself:
   behaviors wait where they can. They go on when it is heard again, and lapse when the lease is over.
 """
 
+from collections.abc import Mapping
+
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import OngoingActions
-from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift
+from engage_hri.schemas.behaviors import (
+    Action,
+    BlockBehavior,
+    Gaze,
+    GazeShift,
+    Head,
+    HeadDirectionShift,
+    Pointing,
+    Speech,
+)
+from engage_hri.schemas.blocks import BodyHeld, Hold
 from engage_hri.schemas.body import (
     AbortBehavior,
     BehaviorAborted,
@@ -48,19 +59,17 @@ from engage_hri.schemas.body import (
     WordSpoken,
 )
 from engage_hri.schemas.body_faults import BodyFault, BodyFaults, FaultsSwitched, SwitchFaults, flaw, switched
-from engage_hri.schemas.covered import COVERED_FOR, CoveredObjects
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.holds import BodyHeld, Hold
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, OngoingActions
 from engage_hri.schemas.requests import Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.schemas.world import World
+from engage_hri.schemas.world import COVERED_FOR, CoveredObjects, World
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.body import AbortMode, Arrived, Progress, Reached, Revocation, Spoke
 from engage_hri.services.control.contract.refusals import refusal
 from engage_hri.services.control.contract.variability import Deviations, is_lost
 from engage_hri.services.control.serving import effects, steps
-from engage_hri.services.control.serving.actions import ActionMessage, ActionReporter
 from engage_hri.services.control.serving.live_behavior import LiveBehavior, Status
 from engage_hri.services.control.serving.words_for_voice import progress_of
 from engage_hri.services.reports.ongoing_actions import OngoingActionTracker
@@ -71,6 +80,8 @@ REVOKED_WITHIN: Seconds = 4.0
 """Seconds after which a behavior that was told to end is broken off; before the realizer gives it up."""
 BROKEN_OFF_WITHIN: Seconds = 0.5
 """Seconds after that in which a driver may clear away; then its behavior is given up."""
+
+ActionMessage = ActionBegan | ActionEnded
 
 
 class ControlIntake:
@@ -463,3 +474,63 @@ class ControlIntake:
     def _tell_faults(self, by: str = "") -> None:
         """Publish the faults that are on. by: who has switched them; they stay on when it goes, or is killed."""
         self._publish(keys.BODY_FAULTS, BodyFaults(at=self._stamp(), faults=self._faults, by=by))
+
+
+_HEADS: Mapping[str, Action] = {"NOD": "nod", "SHAKE": "shake"}
+"""Heads that mean something as an action; others only turn or tilt."""
+
+
+class ActionReporter:
+    """Actions of `actor` that people see, from the sync points its body reports and what its eyes rest on.
+
+    Each action that began ends once.
+    """
+
+    def __init__(self, actor: str, clock: str) -> None:
+        self._actor = actor
+        self._clock = clock
+        self._look: ActionBegan | None = None
+        self._open: dict[str, ActionBegan] = {}
+
+    def reached(self, id: str, label: str, behavior: BlockBehavior, reached: Reached) -> list[ActionMessage]:
+        """List the actions that begin or end as request `id` passes a sync point. label: `block:behavior`."""
+        action: Action
+        targets: tuple[str, ...]
+        match behavior:
+            case Pointing(target=target):
+                action, targets, first, last = "point", (target,), "stroke_start", "stroke_end"
+            case Head(lexeme=lexeme) if (known := _HEADS.get(lexeme.upper())) is not None:
+                action, targets, first, last = known, (), "stroke_start", "stroke_end"
+            case Speech():
+                action, targets, first, last = "speak", (), "start", "end"
+            case _:
+                return []
+        if reached.sync == first:
+            self._open[id] = began = self._began(action, targets, label, reached.at)
+            return [began]
+        return self.ended(id, reached.at) if reached.sync == last else []
+
+    def ended(self, id: str, at: Seconds) -> list[ActionMessage]:
+        """End the action of request `id`, if one is open. Call it however the request has ended."""
+        return [self._end(began, at)] if (began := self._open.pop(id, None)) else []
+
+    def looks_at(self, entity: str, label: str, at: Seconds) -> list[ActionMessage]:
+        """List the looks that end and begin as the eyes come to rest on `entity`; empty: on nothing.
+
+        label: `block:behavior` that brought the eyes there; empty: unknown.
+        """
+        if entity == (self._look.targets[0] if self._look else ""):
+            return []
+        messages: list[ActionMessage] = [self._end(self._look, at)] if self._look else []
+        self._look = self._began("look", (entity,), label, at) if entity else None
+        return [*messages, self._look] if self._look else messages
+
+    def _began(self, action: Action, targets: tuple[str, ...], label: str, at: Seconds) -> ActionBegan:
+        stamp = Stamp(self._clock, at)
+        return ActionBegan(actor=self._actor, action=action, at=stamp, targets=targets, behavior=label)
+
+    def _end(self, began: ActionBegan, at: Seconds) -> ActionEnded:
+        return ActionEnded(
+            actor=began.actor, action=began.action, at=Stamp(self._clock, at), targets=began.targets,
+            behavior=began.behavior,
+        )  # fmt: skip

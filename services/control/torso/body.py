@@ -40,10 +40,9 @@ from engage_hri.services.control.torso.mouth import Mouth
 from engage_hri.services.control.torso.rehearsal import ClockOfCopy, beside, rehearsed
 from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
 from engage_hri.services.control.torso.torso import Torso
-from engage_hri.services.control.voice.lipsync import LipSync
-from engage_hri.services.control.voice.speaker import speech_estimate
+from engage_hri.services.control.voice.speaker import Voice, speech_estimate
+from engage_hri.services.control.voice.speaking import speak
 from engage_hri.services.control.voice.timeline import uttered
-from engage_hri.services.control.voice.voice import Voice
 from engage_hri.services.runtime.steps import Steps, finished
 
 FAULTS = tuple(KINDS)
@@ -257,14 +256,12 @@ class SimulatedBody(WalkingBody[Run]):
             raise BehaviorRefused(_fault(behavior, "the voice cannot speak"))
         self._occasions += 1
         pace = 1.0 / variability.rate(self._deviations, ("voice",), behavior.id, self._occasions)
-        lips = LipSync(behavior, uttered(behavior, pace), authority, self._loop.time, self.on_lips)
-        with lips.following():
-            async with aclosing(self._voice.speak(behavior, authority, pace)) as utterance:
-                async for progress in utterance:
-                    lips.hear(progress)
-                    yield progress
-                    if isinstance(progress, Reached) and progress.sync == "end":
-                        return
+        words = speak(behavior, authority, pace, self.on_lips)
+        async with aclosing(self._voice.say(behavior, authority, words)) as utterance:
+            async for progress in utterance:
+                yield progress
+                if isinstance(progress, Reached) and progress.sync == "end":
+                    return
         if self._deviations.of("voiceless"):
             raise BodyFailed(_fault(behavior, "the voice cannot speak"))
 

@@ -17,13 +17,15 @@ from typing import Any
 
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from engage_hri.schemas.speakable import Token, tokens
+from engage_hri.schemas.text import Token, tokens
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.contract.body import MouthShape
+from engage_hri.services.control.voice.lips import lips, loud
 from engage_hri.services.control.voice.synthesis import Heard, Phrase, Said, Synthesizer, refused
 from engage_hri.services.control.voice.timeline import PAUSE, Word, natural
-from engage_hri.services.control.voice.visemes import Lips, lips, loud
 
 Samples = NDArray[np.int16]
 
@@ -190,7 +192,7 @@ class Clause(Struct, frozen=True):
     samples: bytes
     rate: int
     words: tuple[Word, ...]
-    lips: tuple[Lips, ...]
+    lips: tuple[MouthShape, ...]
 
     @property
     def seconds(self) -> Seconds:
@@ -256,16 +258,15 @@ def _samples(given: object) -> Samples:
     return scaled
 
 
-def _lips(said: Said, loudness: Loudness, begin: Seconds, end: Seconds) -> tuple[Lips, ...]:
+def _lips(said: Said, loudness: Loudness, begin: Seconds, end: Seconds) -> tuple[MouthShape, ...]:
     if said.phones:
         shown = lips([(phone.name, phone.at) for phone in said.phones if phone.at < end], end)
-        return tuple(Lips(max(0.0, each.at - begin), each.opening, each.width) for each in shown)
-    size = 6  # frames of the loudness in one shape of the mouth
-    levels = loudness.levels / (loudness.loud or 1.0)
-    means = [float(min(1.0, levels[at : at + size].mean())) for at in range(0, int(end / loudness.step), size)]
-    return tuple(
-        Lips(max(0.0, each.at - begin), each.opening, each.width) for each in loud(means, size * loudness.step)
-    )
+    else:
+        size = 6  # frames of the loudness in one shape of the mouth
+        levels = loudness.levels / (loudness.loud or 1.0)
+        means = [float(min(1.0, levels[at : at + size].mean())) for at in range(0, int(end / loudness.step), size)]
+        shown = loud(means, size * loudness.step)
+    return tuple(replace(each, at=max(0.0, each.at - begin)) for each in shown)
 
 
 def _times(

@@ -15,10 +15,9 @@ from typing import Any
 
 from msgspec.structs import replace
 
+from engage_hri.schemas.advice import suggestion
 from engage_hri.schemas.documents.prosody import Prosody
-from engage_hri.schemas.suggestion import suggestion
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.voice.settings import VoiceSettings
 from engage_hri.services.control.voice.synthesis import (
     Heard,
     Phone,
@@ -26,6 +25,7 @@ from engage_hri.services.control.voice.synthesis import (
     Said,
     SynthesisFailed,
     Synthesizer,
+    VoiceSettings,
     refused,
 )
 from engage_hri.services.runtime.installation import extra_command

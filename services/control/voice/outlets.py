@@ -1,7 +1,9 @@
 """Outlets for sound: what a voice plays goes to a device, into a file, or nowhere, at loop times."""
 
+import struct
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from typing import BinaryIO
 
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
@@ -77,108 +79,61 @@ class Outlet:
 
 
 class Several(Outlet):
-    """Several outlets as one: sound is heard at the same time in each.
+    """All outlets of a voice as one: sound is heard at the same time in each. At first it leads nowhere.
 
     The first is what people hear: all goes by its time, and its fault is that of all. Another one that fails is
-    missing, and says so itself.
+    missing, and says so itself. With the fault `mute` it takes no sound, as a device that has stopped.
+
+    outlets: at least one.
     """
 
-    def __init__(self, outlets: Sequence[Outlet]) -> None:
-        """Join outlets, at least one."""
-        super().__init__(outlets[0].now)
-        self._outlets = outlets
-
-    @property
-    def is_live(self) -> bool:
-        return self._outlets[0].is_live
-
-    @property
-    def lead(self) -> Seconds:
-        return max(each.lead for each in self._outlets)
-
-    @property
-    def fault(self) -> Fault | None:
-        return self._outlets[0].fault
-
-    def earliest(self) -> Seconds:
-        return max(each.earliest() for each in self._outlets)
-
-    def play(self, samples: bytes, at: Seconds) -> None:
-        for each in self._outlets:
-            each.play(samples, at)
-
-    def rest(self) -> None:
-        for each in self._outlets:
-            each.rest()
-
-    def late(self) -> Seconds | None:
-        return self._outlets[0].late()
-
-    def cut(self, at: Seconds, tail: bytes) -> None:
-        for each in self._outlets:
-            each.cut(at, tail)
-
-    def revive(self) -> None:
-        for each in self._outlets:
-            each.revive()
-
-    def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
-        ends = ExitStack()
-        for each in self._outlets:
-            ends.callback(each.watch(on_fault))
-        return ends.close
-
-
-class Gag(Outlet):
-    """An outlet that can be made to take no sound, as a device that has stopped: the fault `mute`."""
-
-    def __init__(self, outlet: Outlet, now: Callable[[], Seconds]) -> None:
-        """Let sound through to an outlet. now: loop time."""
+    def __init__(self, now: Callable[[], Seconds], *outlets: Outlet) -> None:
         super().__init__(now)
-        self.outlet = outlet
+        self.outlets: Sequence[Outlet] = outlets or (Outlet(now),)
         self._is_mute = False
         self._since: Seconds | None = None
-        """Loop time at which it was first asked whether sound is late."""
+        """Loop time at which it was first asked whether sound is late, while it is mute."""
         self._asked: Seconds = 0.0
 
     @property
     def is_live(self) -> bool:
-        return self._is_mute or self.outlet.is_live
+        return self._is_mute or self.outlets[0].is_live
 
     @property
     def lead(self) -> Seconds:
-        return self.outlet.lead
+        return max(each.lead for each in self.outlets)
 
     @property
     def fault(self) -> Fault | None:
-        return self._fault or self.outlet.fault
+        return self._fault or self.outlets[0].fault
 
     def switch(self, *, is_mute: bool) -> None:
         """Take no more sound, or take it again. What was played is not heard to its end."""
-        if is_mute and not self._is_mute:
-            self.outlet.cut(self.now(), b"")
+        if is_mute:
+            self.cut(self.now(), b"")
         self._is_mute = is_mute
         self.revive()
         self.tell_fault()
 
     def revive(self) -> None:
         self._fault = self._since = None
-        self.outlet.revive()
+        for each in self.outlets:
+            each.revive()
 
     def earliest(self) -> Seconds:
-        return self.outlet.earliest()
+        return max(each.earliest() for each in self.outlets)
 
     def play(self, samples: bytes, at: Seconds) -> None:
-        if not self._is_mute:
-            self.outlet.play(samples, at)
+        for each in () if self._is_mute else self.outlets:
+            each.play(samples, at)
 
     def rest(self) -> None:
-        if not self._is_mute:
-            self.outlet.rest()
+        for each in () if self._is_mute else self.outlets:
+            each.rest()
 
     def late(self) -> Seconds | None:
         if not self._is_mute:
-            return self.outlet.late()
+            return self.outlets[0].late()
         now = self.now()
         if self._since is None:
             self._since = self._asked = now
@@ -188,11 +143,90 @@ class Gag(Outlet):
         return late
 
     def cut(self, at: Seconds, tail: bytes) -> None:
-        if not self._is_mute:
-            self.outlet.cut(at, tail)
+        for each in () if self._is_mute else self.outlets:
+            each.cut(at, tail)
 
     def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
         ends = ExitStack()
-        ends.callback(super().watch(on_fault))
-        ends.callback(self.outlet.watch(on_fault))
+        for watch in (super().watch, *(each.watch for each in self.outlets)):
+            ends.callback(watch(on_fault))
         return ends.close
+
+
+COMMENT_SIZE = 80
+_HEADER = 12 + 24 + 8 + 4 + 8 + COMMENT_SIZE + 8
+LARGEST = 2**32 - 2**16
+"""Bytes of sound in one file: its header has no room for more."""
+
+
+class WavFile(Outlet):
+    """A WAV file of all that is said, each sound at its loop time: a whole scenario can be heard and aligned.
+
+    The file is valid after each sound, whatever ends the process then: the sizes in its header are brought up to date
+    with the samples. Its second 0 is the loop time `origin`: 0 in virtual time, else when the voice was connected. A
+    comment in the file (LIST INFO ICMT) says that. It takes what it is given at once, so it needs no lead.
+    """
+
+    def __init__(self, file: BinaryIO, name: str, rate: int, origin: Seconds, now: Callable[[], Seconds]) -> None:
+        """Begin an empty file. file: unbuffered. rate: samples per second. origin: the loop time of its second 0."""
+        super().__init__(now)
+        self._file, self._name, self._rate, self._origin = file, name, rate, origin
+        self._size = 0
+        self._is_told = False
+        """Its fault is known, and told again only after it has taken sound."""
+        self._write(0, _header(0, rate, origin))
+
+    def __enter__(self) -> "WavFile":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._file.close()
+
+    def revive(self) -> None:
+        self._fault = None  # there may be room now
+
+    def play(self, samples: bytes, at: Seconds) -> None:
+        if self.fault is not None:
+            return
+        place = max(0, round((at - self._origin) * self._rate)) * 2
+        if place + len(samples) > LARGEST:
+            self._fail("the file is full", "a WAV file holds 4 GiB; name another one")
+            return
+        if self._write(_HEADER + place, samples):
+            self._size = max(self._size, place + len(samples))
+            self._is_told = not self._write(0, _header(self._size, self._rate, self._origin))
+
+    def cut(self, at: Seconds, tail: bytes) -> None:
+        size = max(0, round((at - self._origin) * self._rate)) * 2
+        if self.fault is None and size < self._size:
+            self._size = size
+            self._write(max(_HEADER, _HEADER + size - len(tail)), tail)
+            self._file.truncate(_HEADER + size)
+            self._write(0, _header(size, self._rate, self._origin))
+
+    def _write(self, place: int, content: bytes) -> bool:
+        try:
+            self._file.seek(place)
+            while content:
+                content = content[self._file.write(content) :]
+        except OSError as error:
+            self._fail(error.strerror or str(error), "is the disk full?")
+        return self.fault is None
+
+    def _fail(self, reason: str, advice: str) -> None:
+        reason = f"the sound file {self._name}: {reason}"
+        self._fault = Fault(reason=reason, where=self._name, advice=advice, service="control")
+        is_told, self._is_told = self._is_told, True
+        if not is_told:
+            self.tell_fault()
+
+
+def _header(size: int, rate: int, origin: Seconds) -> bytes:
+    comment = f"Engage; second 0 is loop time {origin:.6f} s".encode().ljust(COMMENT_SIZE, b"\0")[:COMMENT_SIZE]
+    info = b"INFO" + b"ICMT" + struct.pack("<I", COMMENT_SIZE) + comment
+    return (
+        b"RIFF" + struct.pack("<I", _HEADER - 8 + size) + b"WAVE"
+        + b"fmt " + struct.pack("<IHHIIHH", 16, 1, 1, rate, 2 * rate, 2, 16)
+        + b"LIST" + struct.pack("<I", len(info)) + info
+        + b"data" + struct.pack("<I", size)
+    )  # fmt: skip

@@ -17,10 +17,10 @@ from math import inf
 from typing import NamedTuple
 
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.text import printable
 from engage_hri.schemas.units import Seconds
-from engage_hri.schemas.utf8 import printable
 from engage_hri.services.control.voice.outlets import STUCK, Outlet
-from engage_hri.services.control.voice.settings import VoiceSettings
+from engage_hri.services.control.voice.synthesis import VoiceSettings
 
 try:
     import fcntl

@@ -6,7 +6,7 @@ class MyVoice(SoundingVoice):
 
 import asyncio
 import time
-from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from functools import partial
 from math import inf
@@ -18,7 +18,6 @@ from engage_hri.schemas.behaviors import BlockBehavior, Speech
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.contract.bell import Bell
 from engage_hri.services.control.contract.body import (
     BehaviorRefused,
     BodyFailed,
@@ -27,15 +26,12 @@ from engage_hri.services.control.contract.body import (
 )
 from engage_hri.services.control.voice import player
 from engage_hri.services.control.voice.espeak import EspeakSettings, EspeakSynthesizer
-from engage_hri.services.control.voice.outlets import Gag, Outlet, Several
-from engage_hri.services.control.voice.parts import Part, expected, joined, silent, sounding
-from engage_hri.services.control.voice.settings import VoiceSettings
+from engage_hri.services.control.voice.outlets import Outlet, Several, WavFile
 from engage_hri.services.control.voice.speaker import Speaker
-from engage_hri.services.control.voice.speaking import Parts, utter_parts
+from engage_hri.services.control.voice.speaking import Part, expected, joined, silent, sounding, utter_parts
 from engage_hri.services.control.voice.studio import MAKING, Studio
-from engage_hri.services.control.voice.synthesis import SynthesisFailed, Synthesizer
+from engage_hri.services.control.voice.synthesis import SynthesisFailed, Synthesizer, VoiceSettings
 from engage_hri.services.control.voice.timeline import Piece, Utterance, pieces, utter, uttered
-from engage_hri.services.control.voice.wav import WavFile
 
 
 class SoundingVoice(Speaker):
@@ -56,7 +52,7 @@ class SoundingVoice(Speaker):
         takes = self.synthesizer.Settings is not None
         self._studio = Studio(self.synthesizer, self._settings if takes else None, self._settings.phrase_limit)
         self._studio.on_fault = lambda fault: self.on_fault(fault)
-        self._outlet = Gag(Outlet(self._loop.time), self._loop.time)
+        self._outlet = Several(self._loop.time)
         self._player: player.Player | None = None
         self._pace = 1.0
         """How much longer this voice takes than the model of `timeline`, from what it has said so far."""
@@ -94,8 +90,7 @@ class SoundingVoice(Speaker):
             for each in outlets:
                 stack.callback(each.watch(partial(self._tell_fault, each)))
                 self._tell_fault(each)
-            if outlets:
-                self._outlet.outlet = Several(outlets)
+            self._outlet.outlets = outlets or self._outlet.outlets
             yield
 
     def _file(self) -> WavFile:
@@ -128,9 +123,9 @@ class SoundingVoice(Speaker):
         if not found:
             return uttered(behavior)
         self._studio.ask([piece.phrase for piece in found], self._wait)
-        return joined([self.part(piece) or expected(piece, self._pace) for piece in found])
+        return joined([self._part(piece) or expected(piece, self._pace) for piece in found])
 
-    def part(self, piece: Piece) -> Part | None:
+    def _part(self, piece: Piece) -> Part | None:
         """The part of a phrase, if it is synthesized. Raises SynthesisFailed."""
         clause = self._studio.known(piece.phrase)
         if clause is None:
@@ -148,45 +143,32 @@ class SoundingVoice(Speaker):
             if (fault := self._player.fault) is not None:
                 raise BehaviorRefused(replace(fault, where=behavior.id))
         self._outlet.revive()
-        parts = _Phrases(behavior, self, self._studio)
+        found = pieces(behavior, self._settings.language)
+        self._want(found)
+        part_of = partial(self._part_of, behavior, found)
         try:
-            parts.part(0)
+            part_of(0)
         except BodyFailed as error:
             raise BehaviorRefused(error.fault) from error
-        return utter_parts(behavior, authority, parts, self._outlet, lambda shapes: self.on_lips(shapes))
+        return utter_parts(
+            behavior, authority, part_of, self._outlet, lambda shapes: self.on_lips(shapes), self._studio.watch
+        )
 
-    def pieces_of(self, behavior: Speech) -> Sequence[Piece]:
-        """Cut a speech into phrases, and have them synthesized."""
-        found = pieces(behavior, self._settings.language)
-        self.want(found)
-        return found
-
-    def want(self, asked: Sequence[Piece]) -> None:
-        """Ask for phrases, before all others."""
-        self._studio.ask([piece.phrase for piece in asked], self._wait, first=True)
-
-
-class _Phrases(Parts):
-    """The parts of a speech, as its phrases are synthesized."""
-
-    def __init__(self, behavior: Speech, voice: SoundingVoice, studio: Studio) -> None:
-        self._behavior, self._voice, self._studio = behavior, voice, studio
-        self._pieces = voice.pieces_of(behavior)
-
-    def part(self, number: int) -> Part | None:
-        if not self._pieces:
-            return silent(self._behavior)
-        piece = self._pieces[number]
+    def _part_of(self, behavior: Speech, found: Sequence[Piece], number: int) -> Part | None:
+        """The part of a number, if it is synthesized; else it is asked for. Raises BodyFailed."""
+        if not found:
+            return silent(behavior)
         try:
-            if (part := self._voice.part(piece)) is None:
-                self._voice.want([piece])
-                part = self._voice.part(piece)
+            if (part := self._part(found[number])) is None:
+                self._want([found[number]])
+                part = self._part(found[number])
             return part
         except SynthesisFailed as error:
-            raise BodyFailed(replace(error.fault, where=self._behavior.id)) from error
+            raise BodyFailed(replace(error.fault, where=behavior.id)) from error
 
-    def watch(self, bell: Bell) -> Callable[[], None]:
-        return self._studio.watch(bell)
+    def _want(self, asked: Sequence[Piece]) -> None:
+        """Ask for phrases, before all others."""
+        self._studio.ask([piece.phrase for piece in asked], self._wait, first=True)
 
 
 class EspeakVoice(SoundingVoice):

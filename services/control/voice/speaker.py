@@ -1,8 +1,10 @@
-"""Bodies of one part that speak: their base, and estimates of what they say."""
+"""Voices of bodies, bodies of one part that speak, and estimates of what they say."""
 
+from abc import ABC, abstractmethod
 from collections.abc import AsyncGenerator, Sequence
 from contextlib import aclosing
 from itertools import pairwise
+from math import inf
 
 from msgspec.structs import replace
 
@@ -14,6 +16,7 @@ from engage_hri.schemas.documents.prosody import unread
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.world import World
+from engage_hri.services.control.contract.bell import Bell
 from engage_hri.services.control.contract.body import (
     BehaviorRefused,
     Body,
@@ -26,7 +29,65 @@ from engage_hri.services.control.contract.body import (
 from engage_hri.services.control.contract.refusals import infeasible, unsupported
 from engage_hri.services.control.voice.synthesis import SynthesisFailed
 from engage_hri.services.control.voice.timeline import Utterance
-from engage_hri.services.control.voice.voice import Voice
+
+
+class Voice:
+    """Voice of a body: it says one text at a time, and refuses another one meanwhile.
+
+    is_mute: it makes no sound, and reports its words all the same; may be changed while it speaks.
+    """
+
+    def __init__(self, *, is_mute: bool = False) -> None:
+        self.is_mute = is_mute
+        self._text = ""
+        self._utterance: MovementAuthority | None = None
+        self._waiting: list[Bell] = []
+
+    @property
+    def saying(self) -> str:
+        """The text that is being said; empty: silence."""
+        return "" if self.is_mute else self._text
+
+    @property
+    def is_busy(self) -> bool:
+        return self._utterance is not None
+
+    def hush(self) -> None:
+        """End what is being said, at a word."""
+        if self._utterance is not None:
+            self._utterance.revoke()
+
+    async def wait_for_silence(self, authority: MovementAuthority) -> None:
+        """Wait until an aborted speech has finished its current word; return at once if `authority` is revoked."""
+        bell = Bell()
+        unwatch = authority.watch(bell.ring)
+        self._waiting.append(bell)
+        try:
+            while self._utterance is not None and self._utterance.revoked is not None and authority.revoked is None:
+                await bell.wait(inf)
+        finally:
+            self._waiting.remove(bell)
+            unwatch()
+
+    async def say(
+        self, behavior: Speech, authority: MovementAuthority, words: AsyncGenerator[Progress, None]
+    ) -> AsyncGenerator[Progress, None]:
+        """Say a text. words: what is told of it as it is said. Raises BehaviorRefused: it says another."""
+        if self._utterance is not None:
+            reason = f"the voice is busy with {self._text!r}"
+            raise BehaviorRefused(Fault(reason=reason, where=behavior.id, service="control"))
+        self._utterance, self._text = authority, behavior.text
+        try:
+            async with aclosing(words) as utterance:
+                async for progress in utterance:
+                    if isinstance(progress, Reached) and progress.sync == "end":
+                        self._utterance, self._text = None, ""
+                    yield progress
+        finally:
+            if self._utterance is authority:
+                self._utterance, self._text = None, ""
+            for bell in self._waiting:
+                bell.ring()
 
 
 def speech_estimate(behavior: Speech, utterance: Utterance, pose: BodyPose | None) -> Estimate:
@@ -53,7 +114,7 @@ FAULTS = ("mute", "voiceless")
 """Kinds of faults that it can play."""
 
 
-class Speaker(Body):
+class Speaker(Body, ABC):
     """A body with the one part `voice`. A subclass says how long a speech takes, and says it."""
 
     def __init__(self, name: str) -> None:
@@ -61,13 +122,13 @@ class Speaker(Body):
         self._voice = Voice()
         self._faults: tuple[BodyFault, ...] = ()
 
+    @abstractmethod
     def timed(self, behavior: Speech) -> Utterance:
         """Lay a speech out in time. Raises SynthesisFailed: it cannot be said."""
-        raise NotImplementedError
 
+    @abstractmethod
     async def said(self, behavior: Speech, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         """Get ready for a speech, and return what is told of it as it is said. Raises BehaviorRefused."""
-        raise NotImplementedError
 
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         if not isinstance(behavior, Speech):

@@ -1,18 +1,23 @@
 """Speech and waiting on loop time: the behaviors of a body that move no joint.
 
+A text is said part by part, and a part may come only while the one before it is said. A silent voice has one part,
+with the words in time alone; one that sounds has a part for each phrase. What is to come in a part are items in time
+order: words, marks, and where sound is handed over.
+
 A voice hands sound over `lead` seconds before it is heard. So each word has two instants: when it is handed over, and
 whether it may be is decided, and when it is heard and told of. Without a sound device they are one.
 """
 
+from array import array
 from collections import deque
 from collections.abc import AsyncGenerator, Callable, Sequence
-from contextlib import aclosing
 from math import inf
-from typing import Protocol
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Speech, Wait
+from engage_hri.schemas.text import tokens
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.bell import EARLY, Bell
 from engage_hri.services.control.contract.body import (
@@ -24,63 +29,194 @@ from engage_hri.services.control.contract.body import (
     Reached,
     Spoke,
 )
+from engage_hri.services.control.voice.clauses import Clause
+from engage_hri.services.control.voice.lips import spelled
 from engage_hri.services.control.voice.outlets import Outlet
-from engage_hri.services.control.voice.parts import FADE, Cut, Gap, Item, More, Part, faded, items_of, silent
-from engage_hri.services.control.voice.visemes import Lips
+from engage_hri.services.control.voice.timeline import Piece, Utterance, Word, utter, uttered
 
 OnLips = Callable[[Sequence[MouthShape]], None]
 CHECK: Seconds = 0.05
 """How often it is looked whether a device takes the sound."""
 
 
-class Parts(Protocol):
-    """The parts of a speech, as they become ready."""
-
-    def part(self, number: int) -> Part | None:
-        """The part of this number, from 0; None: it is not ready yet. Raises BodyFailed: it never will be."""
-
-    def watch(self, bell: Bell) -> Callable[[], None]:
-        """Ring a bell when another part is ready, until the returned function is called."""
+# -- what is to come ----------------------------------------------------------------------------------------------
 
 
-class OnePart:
-    """A speech that is ready as a whole."""
+class Part(Struct, frozen=True):
+    """A part of a speech. Its words have their places in the whole text, and times from the start of the part.
 
-    def __init__(self, part: Part) -> None:
-        self._part = part
+    end: characters of the text up to its end. pause: seconds of silence after it. lips: from the start of the part.
+    samples: 16 bit, little-endian, one channel; empty: it is silent. rate: samples per second.
+    """
 
-    def part(self, number: int) -> Part | None:
-        return self._part
+    utterance: Utterance
+    end: int
+    pause: Seconds = 0.0
+    lips: tuple[MouthShape, ...] = ()
+    samples: bytes = b""
+    rate: int = 0
 
-    def watch(self, bell: Bell) -> Callable[[], None]:
-        return lambda: None
+
+def silent(speech: Speech, pace: float = 1.0) -> Part:
+    """The one part of a speech that is said in silence. pace: 2 takes twice as long."""
+    utterance = uttered(speech, pace)
+    return Part(utterance, len(speech.text), lips=spelled(utterance))
 
 
-async def speak(behavior: Speech, authority: MovementAuthority, pace: float = 1.0) -> AsyncGenerator[Progress, None]:
+def sounding(piece: Piece, clause: Clause) -> Part:
+    """The part of a phrase that was synthesized."""
+    whole = Utterance(_as_written(piece, clause.words), clause.seconds)
+    return Part(whole, piece.end, piece.pause, clause.lips, clause.samples, clause.rate)
+
+
+def expected(piece: Piece, pace: float) -> Part:
+    """The part that a phrase will be, for as long as it is not synthesized. pace: 2 takes twice as long."""
+    modelled = utter(piece.phrase.text, pace, piece.phrase.prosody)
+    return Part(Utterance(_as_written(piece, modelled.words), modelled.seconds), piece.end, piece.pause)
+
+
+def _as_written(piece: Piece, said: Sequence[Word]) -> tuple[Word, ...]:
+    """The words of a phrase as they stand in the text, where there is more: an emoji is not given to the engine."""
+    words: list[Word] = []
+    number, now = 0, 0.0
+    for token in tokens(piece.text):
+        begin = token.end - len(token.text)
+        since = until = None
+        while number < len(said) and said[number].position <= token.end:
+            word = said[number]
+            number += 1
+            if word.position - len(word.text) >= begin:
+                since, until = (word.start if since is None else since), word.end
+        start, now = (now, now) if since is None or until is None else (since, max(now, until))
+        words.append(Word(token.text, min(start, now), now, piece.start + token.end))
+    return tuple(words)
+
+
+def joined(parts: Sequence[Part]) -> Utterance:
+    """The whole speech: its parts one after the other; at least one."""
+    words: list[Word] = []
+    begin = 0.0
+    for part in parts:
+        words += [replace(word, start=word.start + begin, end=word.end + begin) for word in part.utterance.words]
+        begin += part.utterance.seconds + part.pause
+    return Utterance(tuple(words), begin - parts[-1].pause)
+
+
+FADE: Seconds = 0.004
+"""Seconds in which sound fades where it is cut between two words, so that it does not click."""
+
+
+class Gap(Struct, frozen=True):
+    """Silence before a word.
+
+    part: the number of its part. since, until: seconds in the part, from this word to the next one. word: its end.
+    """
+
+    part: int
+    since: Seconds
+    until: Seconds
+    word: "Item"
+
+
+class More(Struct, frozen=True):
+    """The place at which the next part has to be ready. part: its number."""
+
+    part: int
+
+
+class Cut(Struct, frozen=True):
+    """The place from which on sound is taken back that was handed over. tail: the faded samples before it."""
+
+    tail: bytes
+
+
+class Item(Struct, frozen=True):
+    """A thing that is to come at `at`, seconds from the start of the utterance.
+
+    is_gap: of a mark between two words.
+    """
+
+    at: Seconds
+    what: Reached | Spoke | Gap | More | Cut
+    is_gap: bool = False
+
+
+def faded(samples: bytes) -> bytes:
+    """Let samples end in silence."""
+    values = array("h", samples)
+    count = len(values)
+    return array("h", [value * (count - place) // count for place, value in enumerate(values)]).tobytes()
+
+
+def items_of(behavior: Speech, part: Part, number: int, start: int, base: Seconds) -> list[Item]:
+    """List all that is to come in a part, in time order. start: characters of the text before it.
+
+    Reports of one instant are in the order of the text: a word, the mark after it, the gap before the next.
+    """
+    last, utterance = len(behavior.text), part.utterance
+    is_last = part.end >= last
+    score: list[tuple[Seconds, int, Item]] = []
+    if number == 0:
+        score.append((0.0, -1, Item(0.0, Reached("start", 0.0, 0.0))))
+    told = {}
+    for word in utterance.words:
+        told[word.position] = Item(base + word.end, Spoke(word.text, word.position, word.end))
+        score.append((word.end, word.position, told[word.position]))
+    for mark in sorted(behavior.marks, key=lambda mark: mark.position):
+        if start <= mark.position < part.end or (is_last and mark.position >= part.end):
+            at = utterance.said_by(mark.position)
+            item = Item(base + at, Reached(mark.id, at, at), utterance.is_gap(mark.position))
+            score.append((at, mark.position, item))
+    said = [word for word in utterance.words if word.end > word.start]
+    following = [word.start for word in said[1:]] + [utterance.seconds] * bool(said)
+    for word, until in zip(said, following, strict=True):
+        gap = Gap(number, word.start if word is not said[0] else 0.0, until, told[word.position])
+        score.append((word.start, word.position - len(word.text), Item(base + word.start, gap)))
+    if is_last:
+        end = Item(base + utterance.seconds, Reached("end", 0.0, 0.0))
+        score.append((utterance.seconds, last, end))
+    else:
+        after = utterance.seconds + part.pause
+        score.append((after, part.end, Item(base + after, More(number + 1))))
+    return [item for _, _, item in sorted(score, key=lambda each: each[:2])]
+
+
+PartOf = Callable[[int], Part | None]
+"""The part of a number, from 0; None: it is not ready yet. Raises BodyFailed: it never will be."""
+
+
+# -- saying it ----------------------------------------------------------------------------------------------------
+
+
+def speak(
+    behavior: Speech, authority: MovementAuthority, pace: float = 1.0, on_lips: OnLips = lambda shapes: None
+) -> AsyncGenerator[Progress, None]:
     """Say a text in silence, word by word. pace: 2 takes twice as long. Like `utter_parts`."""
-    bell = Bell()
-    parts = OnePart(silent(behavior, pace))
-    async with aclosing(utter_parts(behavior, authority, parts, Outlet(bell.now))) as progress:
-        async for each in progress:
-            yield each
+    part = silent(behavior, pace)
+    return utter_parts(behavior, authority, lambda number: part, Outlet(Bell().now), on_lips)
 
 
 async def utter_parts(
     behavior: Speech,
     authority: MovementAuthority,
-    parts: Parts,
+    part_of: PartOf,
     outlet: Outlet,
     on_lips: OnLips = lambda shapes: None,
+    watch_parts: Callable[[Bell], Callable[[], None]] = lambda bell: lambda: None,
 ) -> AsyncGenerator[Progress, None]:
     """Say a text word by word. At a mark between two words the voice pauses until it may pass the mark.
 
     While it is held it pauses before the next word, too. If the authority is revoked, the voice finishes the word
     that is heard, and takes back what was handed over after it. What a device has not taken is not told as heard:
-    words and lips wait for it. Raises BodyFailed: nothing is heard any more.
+    words and lips wait for it.
+
+    watch_parts: rings a bell when another part is ready, until the function that it returns is called.
+
+    Raises BodyFailed: nothing is heard any more.
     """
     bell = Bell()
-    ends = [authority.watch(bell.ring), outlet.watch(bell.ring), parts.watch(bell)]
-    utterance = _Utterance(behavior, authority, parts, outlet, on_lips, bell)
+    ends = [authority.watch(bell.ring), outlet.watch(bell.ring), watch_parts(bell)]
+    utterance = _Utterance(behavior, authority, part_of, outlet, on_lips, bell)
     try:
         while not utterance.is_over:
             looked = bell.now()
@@ -103,12 +239,12 @@ class _Utterance:
         self,
         behavior: Speech,
         authority: MovementAuthority,
-        parts: Parts,
+        part_of: PartOf,
         outlet: Outlet,
         on_lips: OnLips,
         bell: Bell,
     ) -> None:
-        self._behavior, self._authority, self._parts = behavior, authority, parts
+        self._behavior, self._authority, self._part_of = behavior, authority, part_of
         self._outlet, self._on_lips, self._bell = outlet, on_lips, bell
         self._begin = outlet.earliest() if outlet.lead else bell.now()
         self._ready: list[Part] = []
@@ -122,7 +258,7 @@ class _Utterance:
         """The words that were handed over, and when each begins."""
         self._lates = 0
         """How many times in a row the device was late."""
-        self._lips: list[Lips] = []
+        self._lips: list[MouthShape] = []
         self._tail: tuple[bytes, Seconds, int] | None = None
         """The last samples of a word, which fade if no word follows at once; when they sound, and their rate."""
         self._arrived: Seconds | None = None
@@ -236,7 +372,7 @@ class _Utterance:
     def _may_go(self, item: Item) -> bool:
         match item.what:
             case More(part=number):
-                return self._parts.part(number) is not None
+                return self._part_of(number) is not None
             case Gap():
                 return not self._authority.held
             case Reached(sync=sync) if item.is_gap:
@@ -246,7 +382,7 @@ class _Utterance:
     def _do(self, item: Item) -> None:
         match item.what:
             case More(part=number):
-                part = self._parts.part(number)
+                part = self._part_of(number)
                 assert part is not None
                 self._begin_part(part, number, item.at)
             case Gap() as gap:
@@ -267,7 +403,7 @@ class _Utterance:
         start = self._ready[-1].end if self._ready else 0
         self._ready.append(part)
         self._ahead.extend(items_of(self._behavior, part, number, start, at))
-        self._lips += [Lips(each.at + at, each.opening, each.width) for each in part.lips]
+        self._lips += [replace(each, at=each.at + at) for each in part.lips]
         self._tell_lips()
 
     def _cut(self) -> None:
@@ -344,7 +480,7 @@ class _Utterance:
         passed = [number for number, each in enumerate(self._lips) if each.at <= since]
         self._lips = self._lips[passed[-1] if passed else 0 :]
         if self._lips:
-            self._on_lips([MouthShape(self._begin + each.at, each.opening, each.width) for each in self._lips])
+            self._on_lips([replace(each, at=self._begin + each.at) for each in self._lips])
 
 
 async def wait(behavior: Wait, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.documents.prosody import Prosody, spans
-from engage_hri.schemas.speakable import Script, Token, has_words, tokens
+from engage_hri.schemas.text import Script, Token, has_words, tokens
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.voice.synthesis import Phrase
 from engage_hri.services.text.ends import ends

@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Speech
 from engage_hri.schemas.documents.prosody import marked_up
-from engage_hri.schemas.speakable import tokens
+from engage_hri.schemas.text import tokens
 
 WORDS = 2
 """Last words of the turn that are lowered."""

@@ -11,9 +11,9 @@ from itertools import pairwise
 
 from msgspec import Struct
 
-from engage_hri.schemas.behavior_types import canonical_sync
+from engage_hri.schemas.behavior_types import SYNC_POINTS, canonical_sync
 from engage_hri.schemas.behaviors import After, Before, Constraint, FragmentBehavior, Gaze, Reference, Speech
-from engage_hri.schemas.syncref import SYNC_POINTS, SyncRef
+from engage_hri.schemas.references import SyncRef
 from engage_hri.schemas.units import Seconds
 
 Sync = tuple[str, str, str]

@@ -21,7 +21,7 @@ from engage_hri.schemas.behaviors import (
     Timing,
 )
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef
+from engage_hri.schemas.references import BLOCK_ITSELF, SyncRef
 
 Operator = Synchronize | Before | After
 Point = tuple[str, str]

@@ -10,11 +10,11 @@ go home.
 
 from msgspec import Struct
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.attention import Claim
 from engage_hri.schemas.behaviors import Event, GazeShift, Timing
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import RobotState
+from engage_hri.schemas.fragments import Claim
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Degrees, Radians, Seconds
 from engage_hri.schemas.world import World

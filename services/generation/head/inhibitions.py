@@ -5,9 +5,9 @@ from typing import Literal
 
 from msgspec import Struct
 
-from engage_hri.schemas.attention import Claim, Inhibit
 from engage_hri.schemas.behaviors import Hand
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.fragments import Claim, Inhibit
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.permits import HANDS, Permits

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from msgspec import Struct
 
-from engage_hri.schemas.attention import Claim
 from engage_hri.schemas.body import Ray
+from engage_hri.schemas.fragments import Claim
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import Entity, World

@@ -17,7 +17,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Reference, SpeechOption
-from engage_hri.schemas.speakable import word_count
+from engage_hri.schemas.text import word_count
 from engage_hri.schemas.units import Meters
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.generation.config import PhraseAttribute

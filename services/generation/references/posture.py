@@ -6,8 +6,8 @@ from msgspec import Struct
 
 from engage_hri.schemas.behaviors import Constraint, FragmentBehavior, Reference, Speech, Wait
 from engage_hri.schemas.fragments import GestureChoice
-from engage_hri.schemas.speakable import word_count
-from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef
+from engage_hri.schemas.references import BLOCK_ITSELF, SyncRef
+from engage_hri.schemas.text import word_count
 from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE, Motions
 
 

@@ -9,10 +9,9 @@ from typing import Literal
 
 from msgspec import Struct
 
-from engage_hri.schemas.behavior_types import canonical_sync
+from engage_hri.schemas.behavior_types import SYNC_POINTS, canonical_sync
 from engage_hri.schemas.behaviors import Behavior, Gesture, Hand, Head, Pointing
 from engage_hri.schemas.references import type_name
-from engage_hri.schemas.syncref import SYNC_POINTS
 
 Limb = Hand | Literal["head"] | None
 """Part of the body that makes a stroke; None: either arm, as the body chooses."""

@@ -10,10 +10,10 @@ from typing import Literal
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
+from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.requests import are_of_one_run
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.sight import Sight

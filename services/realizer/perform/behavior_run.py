@@ -18,6 +18,7 @@ from msgspec.structs import replace
 from engage_hri.schemas import keys
 from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.behaviors import BlockBehavior, Event, TurnSignal, Wait
+from engage_hri.schemas.blocks import WarningKind
 from engage_hri.schemas.body import (
     BehaviorOutcome,
     GoHome,
@@ -27,7 +28,6 @@ from engage_hri.schemas.body import (
     SyncPointReached,
 )
 from engage_hri.schemas.faults import EngageError, Fault
-from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.decide.decisions import Begin, Decisions, Extend

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.nets import NetMarked, NetWaiting
+from engage_hri.schemas.blocks import NetMarked, NetWaiting
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.export import described, firings

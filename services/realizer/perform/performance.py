@@ -11,11 +11,10 @@ from functools import partial
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.blocks import BlockOutcome
+from engage_hri.schemas.blocks import BlockOutcome, WarningKind
 from engage_hri.schemas.body import Estimate, SyncPointArrived, SyncPointReached
 from engage_hri.schemas.faults import Cause, Fault, InputRefused
-from engage_hri.schemas.feedback import WarningKind
-from engage_hri.schemas.syncref import BLOCK_ITSELF
+from engage_hri.schemas.references import BLOCK_ITSELF
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Containing
 from engage_hri.services.realizer.config import RealizerConfig

@@ -12,10 +12,9 @@ from engage_hri.schemas.behavior_types import canonical_sync
 from engage_hri.schemas.behaviors import Event, Speech, TurnSignal
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.faults import EngageError
-from engage_hri.schemas.presence import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn
-from engage_hri.schemas.references import type_name
-from engage_hri.schemas.syncref import SyncRef
+from engage_hri.schemas.references import SyncRef, type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.net.facts import Facts

@@ -7,10 +7,8 @@ import asyncio
 from collections.abc import Iterable, Mapping
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.blocks import PerformanceSteered, SteerPerformance, SteerRobot
+from engage_hri.schemas.blocks import Held, Hold, PerformanceSteered, SteerPerformance, SteerRobot, WarningFeedback
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import WarningFeedback
-from engage_hri.schemas.holds import Held, Hold
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.config import RealizerConfig

@@ -8,11 +8,10 @@ from typing import NamedTuple
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.behavior_types import TYPES
+from engage_hri.schemas.behavior_types import SYNC_POINTS, TYPES
 from engage_hri.schemas.behaviors import Gesture, Hand, Pointing
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
-from engage_hri.schemas.syncref import SYNC_POINTS
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.facts import NO_STOPS, Stops
 from engage_hri.services.realizer.plan.phases import ARMS, Chain

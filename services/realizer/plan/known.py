@@ -6,7 +6,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.body import Estimate
-from engage_hri.schemas.syncref import BLOCK_ITSELF
+from engage_hri.schemas.references import BLOCK_ITSELF
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.facts import NO_STOPS, Stops
 from engage_hri.services.realizer.plan.phases import Chain

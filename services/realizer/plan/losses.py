@@ -15,11 +15,10 @@ from engage_hri.schemas.behavior_types import types_with
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
-from engage_hri.services.realizer.plan.assembly import Assembly
-from engage_hri.services.realizer.plan.handover import Turn, by_ends, turns_in
+from engage_hri.services.realizer.plan.handover import Ends, Turn, turns_in
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import BlockRefused, Classes, Equal, Order, Relations
-from engage_hri.services.realizer.plan.schedule import Circle, Impossible
+from engage_hri.services.realizer.plan.schedule import Circle
 from engage_hri.services.realizer.plan.words import (
     AS_IN_DRAFTS,
     LATER,
@@ -131,14 +130,6 @@ class Loss(NamedTuple):
     line: int = 0
 
 
-class Losses(Exception):
-    """Behaviors that cannot be on time, in document order: planning goes on without them."""
-
-    def __init__(self, losses: Sequence[Loss]) -> None:
-        self.losses = tuple(losses)
-        super().__init__("; ".join(f"{loss.behavior} {loss.reason}" for loss in losses))
-
-
 def clashes(
     turns: Iterable[Turn],
     chains: Mapping[str, Chain],
@@ -203,46 +194,41 @@ def _clash(earlier: Chain, sync: str, later: Chain, classes: Classes) -> bool:
 
 
 def judge(
-    impossible: Impossible,
-    assembly: Assembly,
+    circles: Sequence[Circle],
+    net: PetriNet,
     chains: Mapping[str, Chain],
     relations: Relations,
     classes: Classes,
     block: str,
-    turns: Collection[Turn],
+    turns: Mapping[Ends, Turn],
     spelling: Spelling = AS_IN_DRAFTS,
-) -> Losses | BlockRefused:
-    """The losses of impossible circles, or the refusal of the block.
+) -> list[Loss]:
+    """The losses of impossible circles. turns: as of `by_ends`. Raises BlockRefused.
 
     A time that cannot be met costs a behavior, a speech only if there is no other, and of several the later in the
     document; waiting for each other costs the block, and so does a time that only what is required cannot meet.
     Each circle costs a behavior, unless one that is lost already was part of it.
     """
-    net = assembly.net
     case = _Case(net, chains, lines_by_point(relations), spelling)
     rank = {id: number for number, id in enumerate(chains) if id not in relations.required}
-    ends = by_ends(turns, assembly.at)
-    found = []
-    for circle in impossible.circles:
-        found.append((_loss(circle, case, rank, ends), circle))
+    found = [(_loss(circle, case, rank, turns), circle) for circle in circles]
     losses: dict[str, Loss] = {}
     for loss, circle in sorted(found, key=lambda each: rank[each[0].behavior] if each[0] else -1):
         if loss is not None and not _touched(circle, net) & losses.keys():
             losses[loss.behavior] = loss
     if losses:
-        return Losses(tuple(losses.values()))
+        return list(losses.values())
     everybody = {id: number for number, id in enumerate(chains)}
-    if (loss := _loss(impossible.circles[0], case, everybody, ends)) is not None:
+    if (loss := _loss(circles[0], case, everybody, turns)) is not None:
         times = Times(replace(relations, required=relations.required - {loss.behavior}), {loss.behavior})
         own = [point for point in loss.points if point.behavior == loss.behavior]
         given_up = times.give_up(own, loss.among, ())
         otherwise = f"{given_up[1]} would be given up, and its words said" if given_up else "it would be dropped"
         advice = f"{loss.advice}; it is required: without `required` {otherwise}"
         where, line = f"{block}: {loss.behavior}", loss.line or chains[loss.behavior].behavior.line
-        return BlockRefused(
-            Fault(reason=loss.reason, where=where, line=line, advice=advice), "IMPOSSIBLE_TO_SCHEDULE"
-        )
-    return _deadlock(impossible.circles[0], net, relations.orders, classes, block, chains, spelling)
+        fault = Fault(reason=loss.reason, where=where, line=line, advice=advice)
+        raise BlockRefused(fault, "IMPOSSIBLE_TO_SCHEDULE")
+    raise _deadlock(circles[0], net, relations.orders, classes, block, chains, spelling)
 
 
 class _Case(NamedTuple):
@@ -254,7 +240,7 @@ class _Case(NamedTuple):
     spelling: Spelling
 
 
-def _loss(circle: Circle, case: _Case, rank: Mapping[str, int], turns: Mapping[tuple[int, int], Turn]) -> Loss | None:
+def _loss(circle: Circle, case: _Case, rank: Mapping[str, int], turns: Mapping[Ends, Turn]) -> Loss | None:
     """The behavior that is to blame for a circle; None: the block. rank: place in the document if it may be dropped.
 
     Of two that must have the same part at the same time, the later. For a phase that is too long for the time it is

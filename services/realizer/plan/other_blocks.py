@@ -5,13 +5,12 @@ part over and loses its way home, as within one block; before that, who comes wa
 without. Points of theirs that this block names are times in its schedule, and may leave no time for a behavior of it.
 """
 
-from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Container, Iterator, Mapping
 from math import inf
 
 from msgspec.structs import replace
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.net.petri_net import Bound, Place
 from engage_hri.services.realizer.plan.assembly import Assembly
 from engage_hri.services.realizer.plan.handover import (
     RELAX,
@@ -19,20 +18,16 @@ from engage_hri.services.realizer.plan.handover import (
     Conflict,
     Hands,
     Turn,
-    by_ends,
     is_overlaid,
     last_kept,
     least,
     leaving,
-    turns_in,
     window,
 )
 from engage_hri.services.realizer.plan.known import BLOCK_END, Holder, Known, block_of, is_foreign
-from engage_hri.services.realizer.plan.losses import Loss
 from engage_hri.services.realizer.plan.phases import Chain
 from engage_hri.services.realizer.plan.relations import Equal, Relations, Term
-from engage_hri.services.realizer.plan.schedule import Awaited, Foresight, Impossible
-from engage_hri.services.realizer.plan.words import AS_IN_DRAFTS, Spelling, other_part, taken
+from engage_hri.services.realizer.plan.schedule import Awaited
 from engage_hri.services.realizer.points import EPSILON, Point
 
 
@@ -300,23 +295,6 @@ def awaited(assembly: Assembly, known: Known, waived: Container[tuple[Point, Poi
                 yield Awaited("order", source, target, lag, lag, pair=(own, foreign))
 
 
-def lasting_for_ever(impossible: Impossible, assembly: Assembly, lasting: Iterable[str]) -> set[tuple[str, Point]]:
-    """Behaviors that last for a point of another that waits, through another block, until they have left."""
-    targets = {assembly.at[Point(id, "relax")]: id for id in lasting}
-    found = set()
-    for circle in impossible.circles:
-        ties = [tie for tie, _ in circle]
-        if any(isinstance(tie, Awaited) for tie in ties):
-            found |= {
-                (id, point)
-                for tie in ties
-                if isinstance(tie, Place) and tie.after and (id := targets.get(tie.target)) and tie.behavior == id
-                for point in assembly.net.transitions[tie.source].points
-                if point.behavior == tie.after
-            }
-    return found
-
-
 def is_behind(assembly: Assembly, known: Known, foreign: Point, behavior: str) -> bool:
     """True if a point of another block comes only after this behavior has begun."""
     awaited = known.awaiting.get(foreign, {})
@@ -331,89 +309,6 @@ def coming_with(assembly: Assembly, known: Known, foreign: Point) -> set[Point]:
     named = [each for each in assembly.at if is_foreign(each.behavior) and block_of(each) == block]
     later = assembly.net.later([assembly.at[each] for each in named if known.points.get(each, -inf) >= at])
     return {point for point, transition in assembly.at.items() if transition in later}
-
-
-def futile(impossible: Impossible) -> set[tuple[Point, Point]]:
-    """Pairs of points, as of `awaited`, that wait for each other whatever is planned."""
-    return {tie.pair for circle in impossible.circles for tie, _ in circle if isinstance(tie, Awaited)}
-
-
-def idle(impossible: Impossible, assembly: Assembly, order: Sequence[str]) -> set[tuple[str, str]]:
-    """Waits to leave out, as of `Assembly.waits`: of those in a circle that are mere custom only the last one.
-
-    order: behaviors of the block as the document has them.
-    """
-    rank = {id: number for number, id in enumerate(order)}
-    left_out = list[Place | Bound]()
-    for circle in impossible.circles:
-        ties = [tie for tie, _ in circle]
-        customs = [tie for tie in ties if tie.kind == "series" and not tie.behavior]
-        left_out += [tie for tie in ties if tie.kind != "series"]
-        if customs:
-            ranks = [max(rank.get(each.behavior, -1) for each in assembly.members[tie.target]) for tie in customs]
-            left_out.append(customs[ranks.index(max(ranks))])
-    return assembly.waits(left_out)
-
-
-def losses_to_others(
-    impossible: Impossible,
-    assembly: Assembly,
-    turns: Iterable[Turn],
-    chains: Mapping[str, Chain],
-    known: Known,
-    spelling: Spelling = AS_IN_DRAFTS,
-) -> list[Loss]:
-    """Behaviors that have no time to wait until another block is done with their part, in document order.
-
-    A speech gives up its times before it is lost: it may wait until the other has the voice no more.
-    """
-    ends = by_ends(turns, assembly.at)
-    found = {}
-    for circle in impossible.circles:
-        if (turn := next(turns_in(ends, circle), None)) is not None and is_foreign(turn[1].behavior):
-            ends_of_ties = {end for tie, _ in circle for end in (tie.source, tie.target)}
-            among = frozenset(point for end in ends_of_ties for point in assembly.net.transitions[end].points)
-            chain = chains[turn[0]]
-            points = tuple(point for point in chain.points if chain.type == "speech" and point in among)
-            reason, advice = _taken(turn, chains, known, spelling)
-            found[turn[0]] = Loss(turn[0], reason, points, among, turn, advice)
-    return [found[id] for id in chains if id in found]
-
-
-def ties_within_turns(
-    impossible: Impossible, assembly: Assembly, turns: Iterable[Turn], named: Container[Point]
-) -> set[Point]:
-    """Points of other blocks to which who waits for a part of them is tied, so that it would wait for itself.
-
-    Where a time of the block is fixed besides, the tie is not to blame.
-    """
-    ends = by_ends(turns, assembly.at)
-    found = set[Point]()
-    for circle in impossible.circles:
-        here = {end for tie, _ in circle for end in (tie.source, tie.target)}
-        if (
-            (turn := next(turns_in(ends, circle), None)) is not None
-            and is_foreign(turn[1].behavior)
-            and 0 not in here
-        ):
-            found.update(point for end in here for point in assembly.net.transitions[end].points if point in named)
-    return {point for point in found if is_foreign(point.behavior)}
-
-
-def _taken(turn: Turn, chains: Mapping[str, Chain], known: Known, spelling: Spelling) -> tuple[str, str]:
-    """Reason and advice of the loss of a behavior that would have to wait for one of another block."""
-    id, point = turn
-    holder = known.holders[point.behavior].chain if point.behavior in known.holders else None
-    held = holder.parts if holder is not None else chains[id].parts
-    parts = [part for part in chains[id].parts if part in held]
-    has = taken(point.behavior, parts, point, spelling, at=known.points.get(point))
-    return f"cannot be on time: {has}", other_part(id, chains[id].parts, held, spelling)
-
-
-def too_late(impossible: Impossible, assembly: Assembly) -> set[Point]:
-    """Points that are expected too late for times that are fixed."""
-    late = {tie.target for circle in impossible.circles for tie, _ in circle if isinstance(tie, Foresight)}
-    return {point for number in late for point in assembly.net.transitions[number].points}
 
 
 def without_date(assembly: Assembly, known: Known) -> set[str]:

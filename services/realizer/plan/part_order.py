@@ -1,39 +1,42 @@
-"""The order in which behaviors of a block have a part, where the order of their starts leaves no time for all.
+"""The order in which behaviors of a block have a part, and its speeches the voice, where ties forbid the usual order.
 
-Who has a part first is found by when the behaviors would start, each by itself. Ties to others may leave no time for
-that order: the second cannot wait for the first, or it could if a third came earlier. A search that swaps one pair
-after the other needs hundreds of schedules for a block of a hundred behaviors. So all parts are ordered in one pass
-(precedence constraint posting: Smith and Cheng, "Slack-based heuristics for constraint satisfaction scheduling", AAAI
-1993):
+Usually who has a part first is found by when the behaviors would start, each by itself, and speeches are said as the
+document has them. Ties to others may leave no time for that: the second cannot wait for the first, or it could if a
+third came earlier. A search that swaps one pair after the other needs hundreds of schedules for a block of a hundred
+behaviors. So all users of a part are ordered in one pass (precedence constraint posting: Smith and Cheng,
+"Slack-based heuristics for constraint satisfaction scheduling", AAAI 1993):
 
-1. For each two behaviors it is known how much later than the start of the one the other leaves its part, at least.
-   That comes from the spare time of the ties in a schedule in which nobody waits for a part.
-2. Of two behaviors of which only one can wait for the other, that one waits. This is a new tie and leaves less time
-   to others. So the pairs are looked at again, until nothing new follows.
-3. What is still open is decided in the order in which the behaviors would have to set out: each comes last of those
-   that have the part so far, or as late as the ties allow. Each decision is a tie for the next.
+1. For each two users it is known how much later than the start of the one the other leaves the part, at least. That
+   comes from the spare time of the ties in a schedule in which none of them waits for another (`_Room`).
+2. Of two users of which only one can wait for the other, that one waits. This is a new tie and leaves less time to
+   others. So the pairs are looked at again, until nothing new follows.
+3. What is still open is decided one user after the other: behaviors in the order in which they would have to set out,
+   speeches in that of the document. Each comes last of those that are placed so far, or as late as the ties allow.
+   Each decision is a tie for the next. If one fits nowhere, earlier decisions are taken back, for a while (`MOST`).
 
-A behavior that fits nowhere stays without a place. The schedule tells why, and the behavior is lost.
-
-The work ends: the order follows from the behaviors that have been in the way of others, and these only become more.
-They are kept in mind when a behavior is dropped, so that the next order is right at once.
+A user that fits nowhere all the same is lost: the schedule tells why. The work ends, since each order is found from
+one schedule, and the next only when a behavior or a tie is gone, or when another behavior was in the way.
 """
 
-from collections.abc import Container, Iterable, Mapping, Sequence
-from itertools import accumulate, combinations, pairwise
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from itertools import accumulate, pairwise
 from math import inf
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, Place
 from engage_hri.services.realizer.plan.assembly import Assembly
-from engage_hri.services.realizer.plan.handover import Turn, least
+from engage_hri.services.realizer.plan.handover import Turn, is_tied, least
 from engage_hri.services.realizer.plan.phases import Chain
-from engage_hri.services.realizer.plan.relations import Relations
-from engage_hri.services.realizer.plan.schedule import distances, spare_times
-from engage_hri.services.realizer.points import EPSILON, SHIFTS
+from engage_hri.services.realizer.plan.relations import Classes, Relations
+from engage_hri.services.realizer.plan.schedule import Circle, distances, spare_times
+from engage_hri.services.realizer.points import EPSILON, SHIFTS, Point
+
+MOST = 50
+"""Places that are tried for the users of a part when not all have found one at once."""
 
 
 class Untouched(NamedTuple):
@@ -81,9 +84,13 @@ class PartOrder:
     def turns(self) -> frozenset[Turn]:
         return self.given | self._changed
 
-    def see(self, assembly: Assembly, times: Sequence[Seconds], present: Relations) -> None:
-        """Note a schedule; the first is the one in which nobody waits for a part yet."""
-        self._untouched = self._untouched or Untouched(assembly, times, present)
+    def see(self, seen: Untouched, chains: Mapping[str, Chain]) -> bool:
+        """Note a schedule; the first is the one in which nobody waits for a part yet. True if who has been in the way
+        of others so far changes places at once."""
+        if self._untouched is not None:
+            return False
+        self._untouched = seen
+        return self._order(chains)
 
     def change(
         self, impossible: Iterable[Turn], turns: Iterable[Turn], chains: Mapping[str, Chain], begun: Container[str]
@@ -101,89 +108,164 @@ class PartOrder:
             return False
         rivals = {id for waiter, point in (*found, *turns) for id in (waiter, point.behavior)}
         self._rivals |= {id for id in rivals & chains.keys() if id not in begun and chains[id].type != "speech"}
+        return self._order(chains)
+
+    def _order(self, chains: Mapping[str, Chain]) -> bool:
+        """Order those that have been in the way; False if that gives no new order."""
+        users = [chains[id] for id in chains if id in self._rivals]
         before = self._changed
-        self._changed = _ordered([chains[id] for id in chains if id in self._rivals], self._untouched)
+        if self._untouched is not None and users:
+            self._changed = _turns(users, self._untouched)
         return self._changed != before
 
 
-def _ordered(users: Sequence[Chain], untouched: Untouched) -> frozenset[Turn]:
+class SpeakingOrder:
+    """The order in which the speeches of a block are said. current: the order to plan with; empty: in none.
+
+    It is the document's at first. If that is impossible, the block is planned without any order, once: that shows
+    what is impossible by itself, and the room that there is for other orders. The next order is the last one: what is
+    impossible in it is lost.
+    """
+
+    def __init__(self, speeches: Sequence[str]) -> None:
+        """speeches: in document order."""
+        self._document = self.current = tuple(speeches)
+        self._is_last = len(speeches) < 2
+
+    def begin_anew(self, left: Container[str], *, is_retimed: bool) -> None:
+        """Begin again with those that are left of the speeches, in the order that was found so far.
+
+        is_retimed: a speech has given up a time, so another order may be possible, even that of the document.
+        """
+        is_changed = self.current != self._document
+        self._document = tuple([id for id in self._document if id in left])
+        self.current = () if is_changed and is_retimed else tuple([id for id in self.current if id in left])
+        self._is_last = len(self._document) < 2
+
+    def refute(self, circles: Iterable[Circle]) -> bool:
+        """Plan without an order if these circles come of it; False if none does, or if it was the last one.
+
+        circles: of ties of the net that cannot be kept together.
+        """
+        ties = [tie for circle in circles for tie, _ in circle if isinstance(tie, Place)]
+        if self._is_last or not any({tie.behavior, tie.after} <= {*self.current} for tie in ties):
+            return False
+        self.current = ()
+        return True
+
+    def find(self, seen: Untouched, chains: Mapping[str, Chain], classes: Classes) -> bool:
+        """Find the order to plan with if `seen` is a schedule without one: then True."""
+        if self._is_last or self.current:
+            return False
+        speeches = [chains[id] for id in self._document]
+        found = _orders(speeches, seen, lambda later, earlier: is_tied(later, earlier, classes))
+        order = list(dict.fromkeys(chain.behavior.id for each in found for chain in each))
+        for number, id in enumerate(self._document):
+            if id not in order:  # It fits nowhere: it is said in its place in the document, which is impossible.
+                order.insert(order.index(self._document[number - 1]) + 1 if number else 0, id)
+        self.current = tuple(order)
+        self._is_last = True
+        return True
+
+    @property
+    def turns(self) -> frozenset[Turn]:
+        """Each speech with the end of the one before it, for which it waits."""
+        return frozenset((later, Point(earlier, "end")) for earlier, later in pairwise(self.current))
+
+
+def _turns(users: Iterable[Chain], untouched: Untouched) -> frozenset[Turn]:
     """Each of these behaviors with the one before it that has the same part."""
-    room = _room(users, untouched)
-    by_leaving = sorted(users, key=untouched.leaving)
-    parts = sorted({part for chain in users for part in chain.parts})
+    orders = _orders(sorted(users, key=untouched.leaving), untouched)
+    pairs = (pair for order in orders for pair in pairwise(order))
+    return frozenset((later.behavior.id, one.points[untouched.left(one)]) for one, later in pairs)
+
+
+def _orders(
+    users: Sequence[Chain],
+    untouched: Untouched,
+    is_free: Callable[[Chain, Chain], bool] = lambda later, earlier: False,
+) -> list[list[Chain]]:
+    """For each part, its users in order, without those that fit nowhere.
+
+    users: in the order in which they are placed. is_free: true if the ties say themselves how the first follows the
+    second, so that it waits for nothing else.
+    """
+    room = _room(users, untouched, is_free)
     # A shift takes nothing from a look, nor a look from a shift: see `handover.in_series`.
     groups = [
-        [chain for chain in by_leaving if part in chain.parts and (chain.type in SHIFTS) == is_shift]
-        for part in parts
+        [number for number, chain in enumerate(users) if part in chain.parts and (chain.type in SHIFTS) == is_shift]
+        for part in sorted({part for chain in users for part in chain.parts})
         for is_shift in (False, True)
     ]
-    _decide(groups, room)
-    turns = set[Turn]()
+    room = room.decided(groups)
+    found = []
     for group in groups:
-        order: list[Chain] = []
-        for chain in group:
-            places = range(len(order), -1, -1)
-            fitting = (place for place in places if room.fits(chain, order[max(0, place - 1) : place + 1], place))
-            if (place := next(fitting, None)) is not None:
-                order.insert(place, chain)
-                for earlier, later in pairwise(order[max(0, place - 1) : place + 2]):
-                    room.take(earlier, later)
-        turns |= {(later.behavior.id, one.points[untouched.left(one)]) for one, later in pairwise(order)}
-    return frozenset(turns)
+        tries = iter(range(MOST))
+        placed = _placed(group, [], room, tries, may_skip=False) or _placed(group, [], room, tries, may_skip=True)
+        assert placed is not None
+        order, room = placed
+        found.append([users[number] for number in order])
+    return found
 
 
-def _decide(groups: Iterable[Sequence[Chain]], room: "_Room") -> None:
-    """Let one wait for the other wherever only one can, until nothing new follows."""
-    undecided = {
-        frozenset((one.behavior.id, two.behavior.id)): (one, two)
-        for each in groups
-        for one, two in combinations(each, 2)
-    }
-    is_new = True
-    while is_new:
-        decided = [pair for pair, both in undecided.items() if room.decide(*both)]
-        for pair in decided:
-            del undecided[pair]
-        is_new = bool(decided)
+def _placed(
+    todo: Sequence[int], order: list[int], room: "_Room", tries: Iterator[int], *, may_skip: bool
+) -> tuple[list[int], "_Room"] | None:
+    """The order with all of `todo` in it, and the room that it leaves; None if there is none, or no try is left."""
+    if not todo:
+        return order, room
+    for place in range(len(order), -1, -1):
+        after: _Room | None = room
+        for pair in pairwise((*order[max(0, place - 1) : place], todo[0], *order[place : place + 1])):
+            after = after and after.with_wait(*pair)
+        if after is not None and (may_skip or next(tries, None) is not None):
+            longer = [*order[:place], todo[0], *order[place:]]
+            if found := _placed(todo[1:], longer, after, tries, may_skip=may_skip):
+                return found
+    return _placed(todo[1:], order, room, tries, may_skip=may_skip) if may_skip else None
 
 
 class _Room:
-    """The time that ties leave for one behavior to have a part after another.
+    """The time that ties leave for one user of a part to have it after another.
 
-    users: the behaviors. apart: how much later than the start of each (row) the others leave their parts (column), at
-    least.
+    apart: how much later than the start of each (row) the others leave the part (column), at least. is_free: whether
+    the row follows the column without a wait.
     """
 
-    def __init__(self, users: Sequence[Chain], apart: Sequence[Sequence[Seconds]]) -> None:
-        self._number = {chain.behavior.id: number for number, chain in enumerate(users)}
-        self._apart = np.array(apart)
+    def __init__(self, apart: NDArray[np.float64], is_free: NDArray[np.bool_]) -> None:
+        self._apart = apart
+        self._is_free = is_free
 
-    def is_left(self, earlier: Chain, later: Chain) -> bool:
-        """True if `later` can wait for `earlier`."""
-        one, other = self._number[earlier.behavior.id], self._number[later.behavior.id]
-        return bool(self._apart[other, one] <= EPSILON)
+    def with_wait(self, earlier: int, later: int) -> "_Room | None":
+        """The room that is left if one waits for another; None if it cannot.
 
-    def take(self, earlier: Chain, later: Chain) -> None:
-        """Let `later` wait for `earlier`: what comes after its start is as much later than what `earlier` follows."""
-        one, other = self._number[earlier.behavior.id], self._number[later.behavior.id]
-        np.maximum(self._apart, self._apart[:, one, None] + self._apart[other], out=self._apart)
+        What comes after the start of the later is as much later than what the earlier follows.
+        """
+        if self._is_free[later, earlier]:
+            return self
+        if self._apart[later, earlier] > EPSILON:
+            return None
+        longer = self._apart[:, earlier, None] + self._apart[later]
+        return _Room(np.maximum(self._apart, longer), self._is_free)
 
-    def decide(self, one: Chain, two: Chain) -> bool:
-        """Let one wait for the other if only one can; False if both can."""
-        is_first, is_second = self.is_left(one, two), self.is_left(two, one)
-        if is_first != is_second:
-            self.take(*((one, two) if is_first else (two, one)))
-        return not (is_first and is_second)
+    def decided(self, groups: Iterable[Sequence[int]]) -> "_Room":
+        """The room that is left if one waits for the other wherever only one of the two can."""
+        room, is_open = self, np.zeros_like(self._is_free)
+        for group in groups:
+            is_open[np.ix_(group, group)] = True
+        while True:
+            cannot = (room._apart > EPSILON) & ~room._is_free
+            must = is_open & cannot & ~cannot.T
+            if not must.any():
+                return room
+            is_open &= ~(must | must.T)
+            for earlier, later in np.argwhere(must):
+                room = room.with_wait(earlier, later) or room
 
-    def fits(self, chain: Chain, neighbors: Sequence[Chain], place: int) -> bool:
-        """True if there is room for a behavior among its neighbors. place: how many come before it; 0: none does."""
-        before, after = (neighbors[:1], neighbors[1:]) if place else ((), neighbors)
-        return all(self.is_left(each, chain) for each in before) and all(self.is_left(chain, each) for each in after)
 
-
-def _room(users: Sequence[Chain], untouched: Untouched) -> _Room:
-    at, times = untouched.assembly.at, untouched.times
-    spare = spare_times(untouched.ties, times)
+def _room(users: Sequence[Chain], untouched: Untouched, is_free: Callable[[Chain, Chain], bool]) -> _Room:
+    at, times = untouched.assembly.at, np.array(untouched.times)
+    spare = spare_times(untouched.ties, untouched.times)
     clock = distances(0, spare)
     spare[0] = []  # From each start, the way through the start of the block is known then.
     ends = [at[chain.points[untouched.left(chain)]] for chain in users]
@@ -191,7 +273,6 @@ def _room(users: Sequence[Chain], untouched: Untouched) -> _Room:
     for start in (at[chain.points[0]] for chain in users):
         found = distances(start, spare)
         back = found.get(0, inf)
-        apart.append(
-            [times[end] - times[start] - min(found.get(end, inf), back + clock.get(end, inf)) for end in ends]
-        )
-    return _Room(users, apart)
+        least_spare = [min(found.get(end, inf), back + clock.get(end, inf)) for end in ends]
+        apart.append(times[ends] - times[start] - least_spare)
+    return _Room(np.array(apart), np.array([[is_free(later, earlier) for earlier in users] for later in users]))

@@ -15,6 +15,7 @@ from functools import cached_property
 from msgspec import Struct
 from msgspec.structs import replace
 
+from engage_hri.schemas.advice import suggestion
 from engage_hri.schemas.behavior_types import canonical_sync, dialect_sync, sync_points
 from engage_hri.schemas.behaviors import (
     After,
@@ -28,12 +29,9 @@ from engage_hri.schemas.behaviors import (
     Wait,
     is_empty,
 )
-from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.blocks import Block, WarningKind
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.feedback import WarningKind
-from engage_hri.schemas.references import type_name
-from engage_hri.schemas.suggestion import suggestion
-from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef
+from engage_hri.schemas.references import BLOCK_ITSELF, SyncRef, type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.points import EPSILON, ORIGIN, Point
 

@@ -13,10 +13,9 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.behaviors import Event, Head, Unknown
-from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.blocks import Block, WarningKind
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import WarningKind
 from engage_hri.schemas.vocabulary import unperformed
 from engage_hri.services.realizer.plan.known import is_foreign
 from engage_hri.services.realizer.plan.phases import Chain

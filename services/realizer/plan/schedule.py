@@ -17,7 +17,7 @@ on all ways from one instant to another tells how much later the second must com
 (`distances`).
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from heapq import heappop, heappush
 from math import inf
 from typing import NamedTuple
@@ -168,7 +168,7 @@ class Impossible(Exception):
 
 def predict(
     net: PetriNet,
-    is_dispensable: Callable[[Iterable[Place | Bound]], bool] = lambda ties: False,
+    dispensable: Callable[[Iterable[Place | Bound]], Collection[object]] = lambda ties: (),
     known: Mapping[int, Seconds] = {},
     awaited: Iterable[Awaited] = (),
     may_be_late: bool = False,
@@ -206,7 +206,7 @@ def predict(
                 if sum(room) < excess - EPSILON:
                     hopeless.append(tuple([(tie, least(tie)) for tie, _ in circle]))
                     continue
-                if is_dispensable([tie for tie, _ in circle]):
+                if dispensable([tie for tie, _ in circle]):
                     hopeless.append(circle)
                     continue
                 slower = [

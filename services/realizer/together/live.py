@@ -8,9 +8,9 @@ from typing import Literal
 from msgspec import Struct
 from msgspec.structs import replace
 
+from engage_hri.schemas.advice import suggestion
 from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.suggestion import suggestion
 from engage_hri.services.realizer.points import as_told
 from engage_hri.services.realizer.together.live_blocks import Past
 

@@ -15,8 +15,7 @@ from math import inf
 from typing import Generic, TypeVar
 
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.references import with_names
-from engage_hri.schemas.syncref import BLOCK_ITSELF, LONGEST_ID
+from engage_hri.schemas.references import BLOCK_ITSELF, LONGEST_ID, with_names
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START, at_home, block_of, qualified
 from engage_hri.services.realizer.plan.plan import Plan

@@ -2,8 +2,8 @@
 
 from typing import TypeVar
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.events.presence import NEVER
 

@@ -6,7 +6,7 @@ same look follows within a short pause. Until the pause is over the end is undec
 
 from msgspec import Struct
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.events.limits import in_time
 

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable
 
 from engage_hri.schemas.behavior_types import canonical_sync
-from engage_hri.schemas.syncref import BLOCK_ITSELF, SyncRef
+from engage_hri.schemas.references import BLOCK_ITSELF, SyncRef
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.events.history import Latest
 

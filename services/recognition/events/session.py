@@ -11,12 +11,12 @@ before it, at its own time. An answer exactly at the limit still counts.
 from collections.abc import Callable, Container, Set
 from typing import get_args
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.attention import HeadOwner
 from engage_hri.schemas.behaviors import Action, Event
+from engage_hri.schemas.blocks import BlockProgress, SyncPointProgress
 from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.feedback import BlockProgress, SyncPointProgress
+from engage_hri.schemas.fragments import HeadOwner
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn, TurnOutcome
 from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds

@@ -12,10 +12,9 @@ known only later; until then `undecided` says from when on.
 from collections.abc import Iterable, Iterator
 from itertools import chain
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.body import Ray, RobotState
-from engage_hri.schemas.perception import HeadPose, VoiceActivity
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose, VoiceActivity
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig

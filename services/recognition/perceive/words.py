@@ -9,7 +9,7 @@ from math import inf
 
 from msgspec import Struct
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.units import Probability, Seconds, Stamp
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.limits import ROUNDING

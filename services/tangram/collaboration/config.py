@@ -4,8 +4,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from engage_hri.schemas.ranges import not_negative
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Seconds, not_negative
 
 
 class CollaborationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -6,9 +6,9 @@ so does the world if a fault makes it unsteady.
 
 from collections.abc import Iterator
 
-from engage_hri.schemas.actions import ActorFound, ActorLost
 from engage_hri.schemas.body import Ray, RobotSeen, RobotState
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import ActorFound, ActorLost
 from engage_hri.schemas.units import Seconds, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.tangram.people.config import SimulationConfig

@@ -5,8 +5,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from engage_hri.schemas.ranges import not_negative, positive, shares
-from engage_hri.schemas.units import Degrees, Meters, Probability, Seconds
+from engage_hri.schemas.units import Degrees, Meters, Probability, Seconds, not_negative, positive, shares
 
 HumanKind = Literal["appendix-b", "misplacing", "listening", "stochastic", "attentive", "none"]
 

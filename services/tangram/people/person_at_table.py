@@ -11,7 +11,7 @@ from engage_hri.schemas.footprints import PiecePose, overlap, poses_touching
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.client.people.person_actions import PersonActions
+from engage_hri.services.client.people.actions import PersonActions
 from engage_hri.services.simulation.hearing import Ears
 from engage_hri.services.simulation.human import (
     FACE,

@@ -9,9 +9,16 @@ from typing import Protocol
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import HeadPose, Utterance, VoiceActivity
+from engage_hri.schemas.perception import (
+    ActionBegan,
+    ActionEnded,
+    ActorFound,
+    ActorLost,
+    HeadPose,
+    Utterance,
+    VoiceActivity,
+)
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.tangram.people.config import PerceptionFaults
 from engage_hri.services.tangram.people.faults import Chances, deviated

@@ -6,12 +6,12 @@ from functools import partial
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.participants import PeerAlive
 from engage_hri.schemas.perception import HeadPose, Utterance, VoiceActivity
-from engage_hri.schemas.presence import PeerAlive
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Subscription
-from engage_hri.services.client.people.perceived_actions import PerceivedActions
+from engage_hri.services.client.people.perceived_person import PerceivedActions
 from engage_hri.services.client.people.shared_world import SharedWorld
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings

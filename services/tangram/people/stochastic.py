@@ -10,11 +10,11 @@ from itertools import count
 
 from msgspec import Struct
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.footprints import SIDES, poses_touching
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.simulation.hearing import THINKING, HeardSpeech, Hearing
 from engage_hri.services.simulation.human import (

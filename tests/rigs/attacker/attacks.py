@@ -20,8 +20,7 @@ from typing import Any
 import zenoh
 
 from engage_hri.schemas import access, keys
-from engage_hri.schemas.access import Holder
-from engage_hri.schemas.limits import BESIDE, most
+from engage_hri.schemas.access import BESIDE, Holder, most
 from engage_hri.services.bus.zenoh.crowd import MOST_TOKENS
 
 COMMAND = [sys.executable, "-m", "tests.rigs.attacker.attacks"]

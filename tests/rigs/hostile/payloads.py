@@ -6,21 +6,44 @@ from typing import NamedTuple
 import msgspec
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
-from engage_hri.schemas.attention import HeadOwner, InhibitionEnded
-from engage_hri.schemas.blocks import BehaviorInterrupted, BlockOutcome, PerformanceSteered
+from engage_hri.schemas.blocks import (
+    BehaviorInterrupted,
+    BlockOutcome,
+    BlockProgress,
+    BodyHeld,
+    Held,
+    NetMarked,
+    NetPlanned,
+    NetWaiting,
+    PerformanceSteered,
+    PredictionFeedback,
+    SyncPointProgress,
+    WarningFeedback,
+)
 from engage_hri.schemas.body import RobotSeen, RobotState, SyncPointArrived, SyncPointReached, WordSpoken
 from engage_hri.schemas.body_faults import BodyFaults, FaultsSwitched
-from engage_hri.schemas.conditions import ConditionSet, StudyCondition
-from engage_hri.schemas.feedback import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
-from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
-from engage_hri.schemas.holds import BodyHeld, Held
+from engage_hri.schemas.fragments import (
+    ConditionSet,
+    FragmentOutcome,
+    HeadOwner,
+    InhibitionEnded,
+    StudyCondition,
+    TurnClosed,
+)
 from engage_hri.schemas.messages import COMMANDS, MAJOR, Message
-from engage_hri.schemas.nets import NetMarked, NetPlanned, NetWaiting
-from engage_hri.schemas.perception import HeadPose, Utterance, VoiceActivity
+from engage_hri.schemas.participants import ServiceSettings
+from engage_hri.schemas.perception import (
+    ActionBegan,
+    ActionEnded,
+    ActorFound,
+    ActorLost,
+    HeadPose,
+    OngoingActions,
+    Utterance,
+    VoiceActivity,
+)
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, OpenEvents, Statistics, TurnOutcome
 from engage_hri.schemas.requests import Cancel, KeepAlive, Request
-from engage_hri.schemas.settings import ServiceSettings
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from tests.rigs.hostile.chance import Chance, happens

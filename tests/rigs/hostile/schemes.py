@@ -8,7 +8,6 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.attention import Inhibit
 from engage_hri.schemas.blocks import (
     BlockOutcome,
     InterruptBehavior,
@@ -19,7 +18,7 @@ from engage_hri.schemas.blocks import (
 )
 from engage_hri.schemas.body import AbortBehavior, BehaviorOutcome, GoHome, PerformBehavior
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.fragments import FragmentOutcome, PerformFragment
+from engage_hri.schemas.fragments import FragmentOutcome, Inhibit, PerformFragment
 from engage_hri.schemas.messages import COMMANDS, Message
 from engage_hri.schemas.requests import (
     Accepted,

@@ -20,8 +20,8 @@ from msgspec import Struct
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.messages import decode, encode, encode_json
+from engage_hri.schemas.participants import AskStatus, Status
 from engage_hri.schemas.requests import Cancel
-from engage_hri.schemas.status import AskStatus, Status
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import LOG, Hub, Received, Sample

@@ -17,8 +17,8 @@ from random import Random
 import msgspec
 from msgspec import Struct
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound
 from engage_hri.schemas.behaviors import Action, Event, EventKind, TurnSignal
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound
 from engage_hri.schemas.recognition import RequestEvent, SignalTurn
 from engage_hri.schemas.units import Probability, Seconds, Stamp
 from engage_hri.schemas.world import Entity, World

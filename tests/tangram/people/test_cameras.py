@@ -11,10 +11,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.body import BodyPose, Ray, RobotState
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import HeadPose, Utterance, VoiceActivity
+from engage_hri.schemas.perception import (
+    ActionBegan,
+    ActionEnded,
+    ActorFound,
+    ActorLost,
+    HeadPose,
+    Utterance,
+    VoiceActivity,
+)
 from engage_hri.schemas.units import Seconds, Stamp, Vector
 from engage_hri.schemas.world import World
 from engage_hri.services.simulation.human import (

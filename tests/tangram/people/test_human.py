@@ -2,12 +2,12 @@
 
 import pytest
 
-from engage_hri.schemas.actions import ActionBegan
+from engage_hri.schemas.blocks import BlockProgress
 from engage_hri.schemas.body import WordSpoken
-from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.client.people.utterances import speaking_time
+from engage_hri.services.client.people.actions import speaking_time
 from engage_hri.services.simulation.human import (
     FACE,
     Begun,

@@ -4,9 +4,9 @@ from functools import partial
 
 import pytest
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded
+from engage_hri.schemas.blocks import BlockProgress
 from engage_hri.schemas.body import WordSpoken
-from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.simulation.human import Act, Human, Lay, Leave
 from engage_hri.services.simulation.listening import ListeningHuman

@@ -6,9 +6,9 @@ from functools import partial
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.body_faults import BodyFault
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import Robot
 from engage_hri.services.control.config import ControlConfig

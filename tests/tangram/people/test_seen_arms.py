@@ -7,9 +7,9 @@ from functools import partial
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan
 from engage_hri.schemas.behaviors import Pointing
 from engage_hri.schemas.body import Ray, RobotSeen
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.units import Stamp, Vector
 from engage_hri.schemas.world import Entity
 from engage_hri.services.bus.memory import MemoryHub

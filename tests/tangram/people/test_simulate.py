@@ -9,9 +9,9 @@ import msgspec
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, OngoingActions
+from engage_hri.schemas.blocks import BlockProgress
 from engage_hri.schemas.body import WordSpoken
-from engage_hri.schemas.feedback import BlockProgress
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, OngoingActions
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus, Keep
 from engage_hri.services.bus.memory import MemoryHub

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from engage_hri.schemas.actions import ActionBegan, ActionEnded, ActorLost
 from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.blocks import BlockProgress
 from engage_hri.schemas.body import WordSpoken
-from engage_hri.schemas.feedback import BlockProgress
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorLost
 from engage_hri.schemas.units import Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.tangram.people.habits import Habits

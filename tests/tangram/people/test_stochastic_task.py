@@ -1,6 +1,6 @@
 """The whole system with the stochastic person: the task comes to its end, whatever they get wrong."""
 
-from engage_hri.schemas.actions import ActionBegan
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.world import World
 from engage_hri.services.generation.config import Condition
 from engage_hri.services.tangram.collaboration.task import Goal

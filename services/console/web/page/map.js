@@ -2,7 +2,7 @@
 import { drawn, pieceColor } from "./look.js";
 import { described, sceneInWords } from "./tell.js";
 
-// How a place is seen, as the scene says (services/console/web/above.py): x and y of the robot, in metres, and of the screen, in millimetres.
+// How a place is seen, as the scene says (services/console/web/scene.py): x and y of the robot, in metres, and of the screen, in millimetres.
 let axes = { right: [0, 0], down: [0, 0] };
 const along = ([a, b], x, y) => (a * x + b * y) * 1000;
 const place = ([x, y]) => [along(axes.right, x, y), along(axes.down, x, y)];
