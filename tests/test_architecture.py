@@ -66,7 +66,7 @@ LAYERS = {
     "services/generation": "service > intake > fragments > performance > acts > fragment_check pipeline"
     " > block exchange head > references turns > inhibitions > config",
     "services/realizer": "service > perform > export together > report > decide > foresee > plan > net"
-    " > config inputs points",
+    " > config points",
     "services/recognition": "service > intake > recognizer > perceive statistics > events > config",
 }
 """What lies above what within a folder: its files and folders by name, `*` for all others. Each may import what

@@ -25,8 +25,8 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Answer, Bus, Subscription, Tap
 from engage_hri.services.bus.samples import Received
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.inputs import BodyAnswered, RealizerInput, behaviors_asked
 from engage_hri.services.realizer.service import realize
+from engage_hri.services.realizer.together.planning import BodyAnswered, RealizerInput, behaviors_asked
 from engage_hri.services.runtime.again import Find, content_of
 from engage_hri.services.runtime.intake import StepClock
 from engage_hri.services.runtime.virtual_time import run_virtual

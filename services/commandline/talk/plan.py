@@ -44,7 +44,7 @@ class Options(Embodied):
 
 def main(options: Options) -> int:
     from engage_hri.services.realizer import export
-    from engage_hri.services.realizer.report.outcome import nothing_is_left
+    from engage_hri.services.realizer.report import nothing_is_left
 
     config = options.load()
     source = read_source(options.file)

@@ -89,7 +89,7 @@ class NetStream(Observer):
         self._is_untold = False
         self._net.changes()
         self._fired.clear()
-        fired = {each: at - self._began for each, at in self._net.instants.items()}
+        fired = {each: at - self._began for each, at in self._net.fired.items()}
         message = described(self._plan, self._bus.stamp(self._began), self._net.marking, fired, self._spelling)
         self._bus.publish(keys.NET, replace(message, block=self._block, follows=self._follows))
         self._again.set(self._bus.now() + AGAIN)
