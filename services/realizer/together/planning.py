@@ -43,7 +43,7 @@ from engage_hri.services.realizer.points import Point, frozen, performer
 from engage_hri.services.realizer.together.knowledge import Asker, knowledge, may_share, parts_of
 from engage_hri.services.realizer.together.live import Live
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks, Past
-from engage_hri.services.runtime.ledger import fingerprint
+from engage_hri.services.runtime.intake import fingerprint
 from engage_hri.services.runtime.loop import unhurried
 
 ESTIMATE: Seconds = 2.0
