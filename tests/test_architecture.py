@@ -28,14 +28,13 @@ IMPURE = {"asyncio", "zenoh", "time", "random", "logging", "datetime", "socket",
 MACHINERY = {"bus", "requests", "runtime", "client", "commandline"}
 """Packages of `services` that pure files don't know either; their own pure files aside."""
 PURE_MACHINERY = {
-    "services/requests/asking.py", "services/requests/asking_table.py", "services/requests/deadlines.py",
+    "services/requests/asking.py", "services/requests/asking_table.py",
     "services/requests/serving.py", "services/requests/serving_table.py",
-    "services/runtime/absent.py", "services/runtime/again.py", "services/runtime/installation.py",
-    "services/runtime/intake.py", "services/runtime/ledger.py", "services/runtime/offers.py",
+    "services/runtime/again.py", "services/runtime/installation.py",
+    "services/runtime/intake.py",
     "services/runtime/steps.py",
     "services/client/chunking.py", "services/client/event_stream.py", "services/client/people/actions.py",
-    "services/client/people/shared_world.py", "services/bus/samples.py", "services/bus/payloads.py",
-    "services/bus/often.py", "services/bus/sight.py", "services/bus/zenoh/turns.py",
+    "services/client/people/shared_world.py", "services/bus/deadlines.py", "services/bus/samples.py",
 }  # fmt: skip
 """Files of these packages that are pure themselves."""
 VISITOR = "examples/plain_zenoh_events.py"
@@ -57,8 +56,8 @@ LAYERS = {
     "services": "commandline > console control doctor generation realizer recognition study > tangram"
     " > simulation > client > recording > reports requests > runtime > bus > text",
     "services/text": "ear > marks > pieces > patterns > ends listening",
-    "services/bus": "memory zenoh > answering certificates > interface > payloads subscription > samples often sight"
-    " > config journal keyring",
+    "services/bus": "memory zenoh > certificates > interface > subscription > samples > config deadlines journal"
+    " keyring",
     "services/control": "mujoco reachy_mini torso > figure service testing > bases calibrating serving voice"
     " > contract > config motion",
     "services/commandline": "look robot study talk > app bodies embedding > shell",

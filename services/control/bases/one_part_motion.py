@@ -286,7 +286,10 @@ class OrdinaryBody(WalkingBody[OnePartRun]):
                 raise refused(behavior, reason)
 
     def goals(self, behavior: BlockBehavior, world: World) -> Goals:
-        """Goals of a behavior by the first point of each instant. Raises BehaviorRefused."""
+        """Goals by the first point of each instant. Raises BehaviorRefused.
+
+        behavior: what to do. world: where its targets are.
+        """
         return by_instant(behavior, self._way(behavior, world))
 
     def _seconds(self, here: Angles, goal: Angles) -> Seconds:
@@ -410,13 +413,19 @@ class OrdinaryBody(WalkingBody[OnePartRun]):
     # -- motion -------------------------------------------------------------------------------------------------
 
     def set_off(self, goal: Angles) -> None:
-        """Begin a motion to a goal, unless the joints stand there. Raises BodyFailed: the motors take no command."""
+        """Begin a motion, unless the joints stand there. Raises BodyFailed: the motors take no command.
+
+        goal: angles of all joints.
+        """
         self._came, self._has_come = -inf, False
         if self._goal is not None or self._off(goal) is not None:
             self._command(goal)
 
     def keep_at(self, goal: Angles) -> None:
-        """Go after a goal that has moved; who is on the way there sees it by himself."""
+        """Go after a goal that has moved; who is on the way there sees it by himself.
+
+        goal: angles of all joints.
+        """
         if self._goal is None and self._off(goal) is not None:
             with suppress(BodyFailed):
                 self._command(goal)
@@ -454,7 +463,10 @@ class OrdinaryBody(WalkingBody[OnePartRun]):
         )  # fmt: skip
 
     def suspicion(self, joint: str, *, is_other_way: bool) -> str:
-        """Tell why a joint may not have come."""
+        """Tell why a joint may not have come.
+
+        joint: its name. is_other_way: it has moved, the other way.
+        """
         return "is a sign turned around?" if is_other_way else "is the motor on, free and not too hot?"
 
     def _command(self, goal: Angles) -> None:

@@ -68,22 +68,32 @@ class WalkingBody(Body, Generic[R]):
 
     @abstractmethod
     def set_out(self, behavior: BlockBehavior, authority: MovementAuthority) -> R:
-        """Begin a behavior: `MovingParts.set_out`. Raises BehaviorRefused, Impossible."""
+        """Begin a behavior: `MovingParts.set_out`. Raises BehaviorRefused, Impossible.
+
+        behavior: what to do. authority: that under which it moves.
+        """
 
     def due(self, run: R, point: WalkPoint) -> Seconds | None:
-        """Instant at which the plan of a behavior passes a point; None: it does not go so far yet."""
+        """Instant at which the plan of a behavior passes a point; None: it does not go so far yet.
+
+        run: the behavior. point: where it is to come to.
+        """
         return run.due(point)
 
     async def come(self, run: R, point: WalkPoint, due: Seconds) -> Seconds | None:
-        """Wait until the joints have come to a point that the plan has passed at `due`. Returns when they had.
+        """Wait until the joints have come to a point that the plan has passed. Returns when they had.
 
+        run: the behavior. point: where they are to come to. due: when the plan passed it, in seconds.
         None: something else may have changed; the walk looks again. Raises BodyFailed. Not overridden, the joints are
         where the plan has them.
         """
         return due
 
     def has_come(self, run: R, point: WalkPoint) -> bool:
-        """True if the joints have come to a point that the plan has passed."""
+        """True if the joints have come to a point that the plan has passed.
+
+        run: the behavior. point: where they were to come to.
+        """
         return True
 
     def check(self, run: R) -> None:
@@ -97,9 +107,10 @@ class WalkingBody(Body, Generic[R]):
         return False
 
     def coming_home(self, going: Collection[str], watches: defaultdict[str, Watch]) -> Seconds | None:
-        """Look if the joints of these tracks are at home; None: they are. Returns when to look again (inf: on news).
+        """Look if joints are at home; None: they are. Returns when to look again (inf: on news).
 
-        watches: of their joints, since they have set out. Raises BodyFailed: they make no way any more.
+        going: names of their tracks. watches: of their joints, since they have set out. Raises BodyFailed: they make
+        no way any more.
         """
         until: Seconds = max((self.moves.tracks[name].motion.end for name in going), default=0.0)
         return None if self._loop.time() >= until - EARLY else until
