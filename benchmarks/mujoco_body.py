@@ -226,7 +226,7 @@ async def told(executor: str, physical: Physical) -> Told:
             body = bodies[-1]
 
             def sample(at: Seconds) -> None:
-                trace.append((at, math.degrees(body._plan()[JOINT]), math.degrees(body.bench.measured[JOINT])))
+                trace.append((at, math.degrees(body.planned()[JOINT]), math.degrees(body.bench.measured[JOINT])))
 
             async def listen() -> None:
                 with bus.subscribe(keys.SYNC_POINT) as inbox:

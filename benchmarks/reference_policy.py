@@ -50,8 +50,7 @@ from engage_hri.services.generation.references.motions import (
 )
 from engage_hri.services.generation.references.pairs import ReferenceScene, considered, minimum_of, shown
 from engage_hri.services.generation.references.policy import choose
-from engage_hri.services.generation.references.posture import HeadAndArms
-from engage_hri.services.generation.references.sequence import Movements
+from engage_hri.services.generation.references.sequence import HeadAndArms, Movements
 from engage_hri.services.generation.service import generate
 from engage_hri.services.requests.ends import RequestDesk, Requester
 from engage_hri.services.runtime.service import running
@@ -121,7 +120,11 @@ class Body:
         targets = distinct(sequence)
         here = from_here_told(targets, self.estimates(from_here(targets)))
         ways = [Way("head", since, target) for target in targets for since in (AT_REST, *targets)]
-        ways += [Way("arm", way.since, way.target) for way in ways if here.point(CURRENT_POSE, way.target).feasible]
+        ways += [
+            Way("arm", way.since, way.target)
+            for way in ways
+            if here.known[Way("arm", CURRENT_POSE, way.target)].feasible
+        ]
         return onward_told(ways, here, self.estimates(onward(ways, here)))
 
 

@@ -78,8 +78,8 @@ async def play(plan: Plan, row: str) -> float:
         await asyncio.gather(*tasks)
     taken = perf_counter() - began
     gc.enable()
-    assert len(net.instants) == len(plan.net.transitions)
-    assert all(abs(at - plan.schedule[each]) < 1e-6 for each, at in net.instants.items())
+    assert len(net.fired) == len(plan.net.transitions)
+    assert all(abs(at - plan.schedule[each]) < 1e-6 for each, at in net.fired.items())
     assert len(woken) == len(tasks)
     return taken
 

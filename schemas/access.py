@@ -1,7 +1,7 @@
 """Table of access: who publishes, subscribes to, serves and asks what, and how large and how frequent that may be.
 
 `engage keys acl` makes the rules from it. The limits hold without keys as well: a bus refuses at the sender what is
-larger, and Zenoh drops it where it comes in (services/bus/zenoh/sizes.py). Each is eight times or more the largest
+larger, and Zenoh drops it where it comes in (services/bus/zenoh/rules.py). Each is eight times or more the largest
 message that was measured on its key with a thousand behaviors in a block, a thousand objects in a world, and the
 tangram task.
 
@@ -45,10 +45,6 @@ LOUD_ROBOT = 16 * 1024 * 1024
 """The same for all others. A service hands out that much when it is asked for its past."""
 MOST_PULSES = 20
 """Pulses of one process that a router passes on in a second. A process of ours sends one or two."""
-MOST_MESSAGES = 2000
-"""Messages of one process in a second from which on a router with keys tells of it. A service sends some 64."""
-MOST_QUESTIONS = 1000
-"""The same for questions. A service asks 90 in the second in which 40 clients come at once."""
 LONGEST_KEY = 2048
 """Bytes of a key: it may have two ids of 250 characters. Zenoh stops the link of one who sends 65 536 of them."""
 LONGEST_ENCODING = 255

@@ -11,8 +11,7 @@ from engage_hri.schemas.participants import Step, Taken
 from engage_hri.services.bus.interface import Received
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.runtime.again import Again
-from engage_hri.services.runtime.intake import ServiceIntake
-from engage_hri.services.runtime.ledger import StepClock
+from engage_hri.services.runtime.intake import ServiceIntake, StepClock
 
 
 class RecordedLives:

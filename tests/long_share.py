@@ -59,11 +59,7 @@ LONG = {
 """Files and folders whose tests are long though they are not marked `real_time`, with the reason."""
 
 LONG_TESTS = {
-    "access/test_denials.py": {
-        "test_who_sends_a_great_deal_that_is_allowed_is_told_by_name_in_the_first_tenth_and_hundredth_second": (
-            "a hundred seconds of a full router"
-        ),
-    },
+    "access/test_denials.py": {},
     "cli/test_console.py": {
         "test_a_demo_is_recorded": "a whole task",
     },

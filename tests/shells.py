@@ -2,14 +2,13 @@
 
 SHELLS = {
     "services/realizer/perform/performance.py",  # awaits bodies
-    "services/realizer/perform/links.py",  # asks the body and recognition
+    "services/realizer/perform/recognition_link.py",  # asks recognition
     "services/control/serving/state_publisher.py",  # publishes what the body shows
     "services/control/serving/questions.py",  # answers what behaviors would take
     "services/control/bases/driver_guard.py",  # times the calls of drivers by the clock of the loop
-    "services/realizer/report/feedback.py",  # publishes feedback
+    "services/realizer/report.py",  # publishes feedback
     "services/realizer/perform/behavior_run.py",  # awaits and resolves sync points, awaits ends
-    "services/realizer/together/planning.py",  # asks the body
-    "services/realizer/together/rehearsal.py",  # asks it again
+    "services/realizer/together/planning.py",  # asks the body, and asks it again
     "services/realizer/perform/net_stream.py",  # publishes the marking
     "services/realizer/perform/steering.py",  # holds, continues and stops
     "services/realizer/together/live.py",  # resolved when a block has ended

@@ -28,14 +28,13 @@ IMPURE = {"asyncio", "zenoh", "time", "random", "logging", "datetime", "socket",
 MACHINERY = {"bus", "requests", "runtime", "client", "commandline"}
 """Packages of `services` that pure files don't know either; their own pure files aside."""
 PURE_MACHINERY = {
-    "services/requests/asking.py", "services/requests/asking_table.py", "services/requests/deadlines.py",
+    "services/requests/asking.py", "services/requests/asking_table.py",
     "services/requests/serving.py", "services/requests/serving_table.py",
-    "services/runtime/absent.py", "services/runtime/again.py", "services/runtime/installation.py",
-    "services/runtime/intake.py", "services/runtime/ledger.py", "services/runtime/offers.py",
+    "services/runtime/again.py", "services/runtime/installation.py",
+    "services/runtime/intake.py",
     "services/runtime/steps.py",
     "services/client/chunking.py", "services/client/event_stream.py", "services/client/people/actions.py",
-    "services/client/people/shared_world.py", "services/bus/samples.py", "services/bus/payloads.py",
-    "services/bus/often.py", "services/bus/sight.py", "services/bus/zenoh/turns.py",
+    "services/client/people/shared_world.py", "services/bus/deadlines.py", "services/bus/samples.py",
 }  # fmt: skip
 """Files of these packages that are pure themselves."""
 VISITOR = "examples/plain_zenoh_events.py"
@@ -56,17 +55,17 @@ LAYERS = {
     "schemas": "documents > *",
     "services": "commandline > console control doctor generation realizer recognition study > tangram"
     " > simulation > client > recording > reports requests > runtime > bus > text",
-    "services/text": "ear > marks > pieces > patterns > acts ends listening > abbreviations",
-    "services/bus": "memory zenoh > answering certificates > interface > payloads subscription > samples often sight"
-    " > config journal keyring",
-    "services/control": "mujoco > reachy_mini service testing torso > bases calibrating serving > figure voice"
+    "services/text": "ear > marks > pieces > patterns > ends listening",
+    "services/bus": "memory zenoh > certificates > interface > subscription > samples > config deadlines journal"
+    " keyring",
+    "services/control": "mujoco reachy_mini torso > figure service testing > bases calibrating serving voice"
     " > contract > config motion",
     "services/commandline": "look robot study talk > app bodies embedding > shell",
     "services/client": "language_models > robot > orders > feeds people > chunking event_stream inputs",
-    "services/generation": "service > intake > fragments > performance > body_link choosing_again ways > exchange"
-    " fragment_check > acts lost pipeline > block head names > references turns > permits > config",
+    "services/generation": "service > intake > fragments > performance > acts > fragment_check pipeline"
+    " > block exchange head > references turns > inhibitions > config",
     "services/realizer": "service > perform > export together > report > decide > foresee > plan > net"
-    " > config inputs points",
+    " > config points",
     "services/recognition": "service > intake > recognizer > perceive statistics > events > config",
 }
 """What lies above what within a folder: its files and folders by name, `*` for all others. Each may import what

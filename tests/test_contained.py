@@ -45,7 +45,7 @@ def breaking(attribute: str) -> Callable[..., Any]:
         ("engage_hri.services.realizer.perform.performance.Decisions", "realize"),
         ("engage_hri.services.realizer.decide.decisions.Decisions.advance", "realize"),
         ("engage_hri.services.realizer.decide.decisions.Decisions.reach", "realize"),
-        ("engage_hri.services.realizer.report.feedback.Reporter.reached", "realize"),
+        ("engage_hri.services.realizer.report.Reporter.reached", "realize"),
         ("engage_hri.services.realizer.perform.behavior_run.BehaviorRun._by_body", "realize"),
         ("engage_hri.services.control.service._Control._begin", "realize"),
         ("engage_hri.services.control.serving.intake.ControlIntake._begin", "realize"),

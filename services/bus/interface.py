@@ -11,6 +11,7 @@ import re
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Coroutine, Iterator
+from contextlib import contextmanager
 from math import inf
 from typing import Any, Self, TypeVar
 
@@ -24,10 +25,8 @@ from engage_hri.schemas.participants import BusHealth, ProcessFacts
 from engage_hri.schemas.requests import Request, Unreadable, kind_of, life_of
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
-from engage_hri.services.bus.often import Often
-from engage_hri.services.bus.payloads import unreadable
-from engage_hri.services.bus.samples import sender_of
-from engage_hri.services.bus.sight import Sight
+from engage_hri.services.bus.deadlines import Sight
+from engage_hri.services.bus.samples import Often, sender_of, unreadable
 from engage_hri.services.bus.subscription import CAPACITY as CAPACITY
 from engage_hri.services.bus.subscription import Keep as Keep
 from engage_hri.services.bus.subscription import Reading as Reading
@@ -278,6 +277,70 @@ class Bus(ABC):
     @abstractmethod
     async def leave(self) -> None:
         """Withdraw subscriptions, answers and token. Idempotent."""
+
+
+MOST_ANSWERS = 1024
+"""Answers of one participant that may be under way at once. Who asks more is refused: it is a flood."""
+
+
+class Answering:
+    """Answers of one participant, by key; one in steps is a task of its own. served: how it answers each key."""
+
+    def __init__(self, bus: Bus) -> None:
+        self.served: dict[str, Answer] = {}
+        self.is_open = True
+        self._bus = bus
+        self._tasks: set[asyncio.Task[Message]] = set()
+
+    def begin(self, answer: Coroutine[Any, Any, Message], key: str) -> "asyncio.Task[Message]":
+        """Run an answer to a question on `key`, whoever still waits for it. Raises InputRefused if there are many."""
+        if len(self._tasks) >= MOST_ANSWERS:
+            answer.close()
+            reason, advice = f"{MOST_ANSWERS} questions are being answered", "wait for answers before you ask more"
+            raise InputRefused(Fault(reason=reason, where=key, advice=advice))
+        task = asyncio.create_task(answer, name=f"answer on {key}")
+        self._tasks.add(task)
+        task.add_done_callback(self._ended)
+        return task
+
+    @contextmanager
+    def refusing(self, key: str) -> Iterator[None]:
+        """Turn whatever goes wrong with a question on `key` into InputRefused, with the fault to answer."""
+        try:
+            yield
+        except EngageError as error:
+            raise InputRefused(error.fault) from error
+        except (Exception, asyncio.CancelledError) as error:
+            if is_asked_to_stop():
+                raise
+            raise InputRefused(self._bus.failed(error, f"a question on {key}")) from error
+
+    async def ask(
+        self, key: str, question: Message, deadline: Seconds, carried: Callable[[Message], Message]
+    ) -> Message | None:
+        """Ask this participant, from its own process. None: there is no answer by `deadline`, or it has left.
+
+        carried: makes of an answer what its receiver gets. Raises InputRefused: it answered a fault.
+        """
+        with self.refusing(key):
+            told = self.served[key](question)
+            if not isinstance(told, Coroutine):
+                return carried(told)
+            task = self.begin(told, key)
+            await asyncio.wait([task], timeout=max(deadline - self._bus.now(), 0.0))
+            return carried(task.result()) if task.done() and self.is_open else None
+
+    def _ended(self, task: "asyncio.Task[Message]") -> None:
+        self._tasks.discard(task)
+        if not task.cancelled():
+            task.exception()  # told to whoever waits; nobody has to
+
+    def end(self) -> None:
+        """Answer nothing any more, and break off all answers: their server leaves."""
+        self.is_open = False
+        self.served.clear()
+        for task in tuple(self._tasks):
+            task.cancel()
 
 
 class Containing:

@@ -16,9 +16,9 @@ from engage_hri.schemas.messages import Message, decode, in_form, published
 from engage_hri.schemas.participants import BusHealth, PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
-from engage_hri.services.bus.answering import Answering
 from engage_hri.services.bus.interface import (
     Answer,
+    Answering,
     Bus,
     Hub,
     Received,
@@ -26,7 +26,7 @@ from engage_hri.services.bus.interface import (
     Subscription,
     Tap,
 )
-from engage_hri.services.bus.payloads import LOCAL, read_payload
+from engage_hri.services.bus.samples import LOCAL, read_payload
 from engage_hri.services.bus.subscription import KEYS_KEPT, offer_presence
 
 
@@ -112,7 +112,7 @@ class MemoryHub(Hub):
 
     def wants(self, key: str) -> bool:
         """Tell whether any participant has subscribed to `key`."""
-        return any(bus.wants(key) or bus.taps(key) for bus in self._buses.values())
+        return any(reader.wants(key) for bus in self._buses.values() for reader in bus.readers)
 
     def inject(self, key: str, payload: bytes, encoding: str, life: str = "") -> None:
         """Send a payload from outside, as another program would. A bad one is answered with a Fault.
@@ -131,7 +131,7 @@ class MemoryHub(Hub):
         key = sample.key
         self.sent += 1
         for bus in tuple(self._buses.values()):
-            bus.show(sample, self.sent)
+            bus.deliver(sample, self.sent)
         for bus in [bus for bus in self._buses.values() if bus.wants(key)]:
             notice = bus.unreadable(error, sample)
             if notice is not None and bus.name == keys.server_of(key):
@@ -152,7 +152,7 @@ class MemoryHub(Hub):
 
     def _carry(self, past: Past, sender: str, bus: "MemoryBus") -> None:
         bus.deliver(past.received, past.number)
-        bus.show(past.sample, past.number)
+        bus.deliver(past.sample, past.number)
 
     def _is_cut(self, one: str, other: str) -> bool:
         return (one in self._cut) != (other in self._cut)
@@ -222,11 +222,10 @@ class MemoryBus(Bus):
         self.is_alive = False
         self.answers = Answering(self)
         self._hub = hub
-        self._subscriptions: dict[Subscription, int] = {}
-        """Subscriptions, and the number of the last message that was replayed to each."""
-        self._wanting: dict[str, tuple[tuple[Subscription, int], ...]] = {}
-        """Subscriptions that want a key, of keys seen lately: most messages are for few participants."""
-        self._taps: dict[Tap, int] = {}
+        self._replayed: dict[Subscription | Tap, int] = {}
+        """Readers, and the number of the last message that was replayed to each."""
+        self._wanting: dict[str, tuple[tuple[Subscription | Tap, int], ...]] = {}
+        """Readers that want a key, of keys seen lately: most messages are for few participants."""
 
     @property
     def health(self) -> BusHealth:
@@ -256,24 +255,22 @@ class MemoryBus(Bus):
         return self._hub.wants(key)
 
     def wants(self, key: str) -> bool:
-        return any(subscription.wants(key) for subscription in self._subscriptions)
+        """Tell whether a subscription of this participant wants `key`: a tap takes what nobody can read, too."""
+        return any(isinstance(reader, Subscription) and reader.wants(key) for reader in self._readers)
 
-    def taps(self, key: str) -> bool:
-        """Tell whether a tap of this participant wants `key`."""
-        return any(tap.wants(key) for tap in self._taps)
-
-    def deliver(self, received: Received, number: int) -> None:
+    def deliver(self, message: Received | Sample, number: int) -> None:
+        """Offer a message to the subscriptions that want it, or a sample to such taps. number: its place of all."""
         try:
-            wanting = self._wanting[received.key]
+            wanting = self._wanting[message.key]
         except KeyError:
-            wanting = self._look_up(received.key)
-        for subscription, replayed in wanting:
-            # A message that was on its way when the subscription was made has been replayed to it.
-            if number > replayed:
-                subscription.offer(received)
+            wanting = self._look_up(message.key)
+        for reader, replayed in wanting:
+            # A message that was on its way when the reader was attached has been replayed to it.
+            if number > replayed and isinstance(reader, Tap) is isinstance(message, Sample):
+                reader.offer(message)  # type: ignore[arg-type]
 
-    def _look_up(self, key: str) -> tuple[tuple[Subscription, int], ...]:
-        wanting = tuple(each for each in self._subscriptions.items() if each[0].wants(key))
+    def _look_up(self, key: str) -> tuple[tuple[Subscription | Tap, int], ...]:
+        wanting = tuple(each for each in self._replayed.items() if each[0].wants(key))
         if not keys.is_presence(key):  # each who comes and goes has a key, which is hardly ever asked for again
             if len(self._wanting) >= KEYS_KEPT:
                 self._wanting.clear()
@@ -281,24 +278,12 @@ class MemoryBus(Bus):
         return wanting
 
     def _attach(self, reader: Subscription | Tap) -> None:
-        if isinstance(reader, Tap):
-            self._taps[reader] = self._hub.replay(self.name, reader)
-        else:
-            self._subscriptions[reader] = self._hub.replay(self.name, reader)
-            self._wanting.clear()
+        self._replayed[reader] = self._hub.replay(self.name, reader)
+        self._wanting.clear()
 
     def _detach(self, reader: Subscription | Tap) -> None:
-        if isinstance(reader, Tap):
-            self._taps.pop(reader, None)
-        else:
-            self._subscriptions.pop(reader, None)
-            self._wanting.clear()
-
-    def show(self, sample: Sample, number: int) -> None:
-        """Offer a sample to the taps."""
-        for tap, replayed in self._taps.items():
-            if number > replayed and tap.wants(sample.key):
-                tap.offer(sample)
+        self._replayed.pop(reader, None)
+        self._wanting.clear()
 
     async def _query(self, key: str, message: Message, deadline: Seconds) -> Message | None:
         asked = self._hub.carried(key, message)
@@ -328,9 +313,8 @@ class MemoryBus(Bus):
             return
         self._gone = True
         self.answers.end()
-        self._subscriptions.clear()
+        self._replayed.clear()
         self._wanting.clear()
-        self._taps.clear()
         self._readers.clear()
         self._hub.forget(self.name)
         if self.is_alive:

@@ -67,9 +67,12 @@ class _Queue(Reading[Item]):
     counted in `overflowed`: a flood costs nobody else anything. Who comes and goes is never dropped.
     """
 
-    def __init__(self, patterns: Iterable[str], on_close: Callable[[Any], None]) -> None:
+    def __init__(self, patterns: Iterable[str], capacity: int, on_close: Callable[[Any], None]) -> None:
         self.patterns = tuple(patterns)
+        self.capacity = capacity
         self.overflowed = 0
+        self.waiting = 0
+        """Weight of all that waits."""
         self._queue: deque[Item] = deque()
         self._lives = Counter[str]()
         self._waiting: asyncio.Future[None] | None = None
@@ -93,29 +96,26 @@ class _Queue(Reading[Item]):
             self._carriers[key] = keys.first(self.patterns, key)
         return self._carriers[key]
 
-    @abstractmethod
     def offer(self, item: Item) -> None:
         """Put a message in the queue; called by the bus."""
-
-    def _count(self, item: Item) -> None:
-        self._lives[item.life] += self._weight(item)
-
-    def _put(self, item: Item) -> None:
+        if self._closed:
+            return
+        weight = self._weight(item)
+        self._lives[item.life] += weight
+        self.waiting += weight
+        while self.waiting > self.capacity and self._make_room():
+            pass
         self._queue.append(item)
         self._wake()
 
     def _weight(self, item: Item) -> int:
         return 1
 
-    @abstractmethod
-    def _is_kept(self, item: Item) -> bool:
-        """True for a message that is never dropped: who comes and goes."""
-
     def _make_room(self) -> bool:
         """Drop a message. Returns False if there is none that may be dropped."""
         for life, _ in self._lives.most_common():
             for index, queued in enumerate(self._queue):
-                if queued.life == life and not self._is_kept(queued):
+                if queued.life == life and not keys.is_presence(queued.key):
                     self._remove(index)
                     self.overflowed += 1
                     return True
@@ -124,7 +124,9 @@ class _Queue(Reading[Item]):
     def _remove(self, index: int) -> Item:
         item = self._queue[index]
         del self._queue[index]
-        self._lives[item.life] -= self._weight(item)
+        weight = self._weight(item)
+        self._lives[item.life] -= weight
+        self.waiting -= weight
         if not self._lives[item.life]:
             del self._lives[item.life]
         return item
@@ -178,24 +180,16 @@ class Subscription(_Queue[Received]):
     def __init__(
         self, patterns: Iterable[str], keep: Keep, capacity: int, on_close: Callable[["Subscription"], None]
     ) -> None:
-        super().__init__(patterns, on_close)
-        self.keep, self.capacity = keep, capacity
+        super().__init__(patterns, capacity, on_close)
+        self.keep = keep
 
     def offer(self, item: Received) -> None:
-        if self._closed:
-            return
-        self._count(item)
-        if self.keep is Keep.LATEST:
+        if self.keep is Keep.LATEST and not self._closed:
             for index, queued in enumerate(self._queue):
                 if queued.key == item.key:
                     self._remove(index)
                     break
-        elif len(self._queue) >= self.capacity:
-            self._make_room()
-        self._put(item)
-
-    def _is_kept(self, item: Received) -> bool:
-        return isinstance(item.message, PeerAlive | PeerGone)
+        super().offer(item)
 
 
 class Tap(_Queue[Sample]):
@@ -204,31 +198,8 @@ class Tap(_Queue[Sample]):
     Bounded by the bytes of the payloads; what is dropped is chosen and counted as in a `Subscription`.
     """
 
-    def __init__(self, patterns: Iterable[str], capacity: int, on_close: Callable[["Tap"], None]) -> None:
-        super().__init__(patterns, on_close)
-        self.capacity = capacity
-        self.waiting = 0
-        """Bytes that wait."""
-
-    def _is_kept(self, item: Sample) -> bool:
-        return keys.is_presence(item.key)
-
     def _weight(self, item: Sample) -> int:
         return len(item.payload) + len(item.key)
-
-    def offer(self, item: Sample) -> None:
-        if self._closed:
-            return
-        self._count(item)
-        self.waiting += self._weight(item)
-        while self.waiting > self.capacity and self._make_room():
-            pass
-        self._put(item)
-
-    def _remove(self, index: int) -> Sample:
-        item = super()._remove(index)
-        self.waiting -= self._weight(item)
-        return item
 
 
 def offer_presence(reader: Subscription | Tap, part: keys.Part, message: PeerAlive | PeerGone, now: Seconds) -> None:

@@ -16,7 +16,7 @@ from typer.core import TyperGroup
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.commandline.shell import logs
-from engage_hri.services.commandline.shell.exit_codes import exit_code
+from engage_hri.services.commandline.shell.process import exit_code
 from engage_hri.services.runtime.installation import extra_command
 
 FAMILIES: dict[str, dict[str, str]] = {

@@ -37,9 +37,9 @@ from engage_hri.services.control.serving.live_behavior import sound
 from engage_hri.services.control.serving.questions import Questions
 from engage_hri.services.control.serving.state_publisher import Shown
 from engage_hri.services.requests.ends import RequestDesk
-from engage_hri.services.runtime.alarm import Timer
 from engage_hri.services.runtime.intake import AnswerRequest, PublishMessage, input_of
-from engage_hri.services.runtime.noted import BusClock, NotedIntake
+from engage_hri.services.runtime.ledger import BusClock, NotedIntake
+from engage_hri.services.runtime.loop import Timer
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 

@@ -6,8 +6,7 @@ from typing import Literal
 from msgspec import Struct
 
 from engage_hri.schemas.units import A_DAY, Seconds, span
-from engage_hri.services.doctor.facts import ParticipantFacts, SystemFacts
-from engage_hri.services.doctor.matrix import clock_of, matrix
+from engage_hri.services.doctor.facts import ParticipantFacts, SystemFacts, clock_of, matrix
 
 Severity = Literal["wrong", "doubtful", "note"]
 SOON = 30

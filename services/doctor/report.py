@@ -8,15 +8,11 @@ from rich.table import Table
 from rich.text import Text
 
 from engage_hri.schemas.units import A_DAY, Seconds, span
-from engage_hri.services.doctor.facts import EndpointFacts, SystemFacts
+from engage_hri.services.doctor.facts import Cell, EndpointFacts, SystemFacts, matrix
 from engage_hri.services.doctor.findings import Diagnosis, Severity, certificates
-from engage_hri.services.doctor.matrix import HERE, Cell, matrix
 
+GOOD = Text("Nothing is wrong.", style="bold green")
 STYLES: dict[Severity, str] = {"wrong": "bold red", "doubtful": "yellow", "note": "dim"}
-WIDE = 100
-"""Columns from which on the table of participants has all it can have."""
-NARROW = 80
-"""Columns below which anything may be broken into lines."""
 
 
 def as_json(facts: SystemFacts, found: Sequence[Diagnosis]) -> str:
@@ -28,7 +24,7 @@ def report(facts: SystemFacts, found: Sequence[Diagnosis], width: int = 80) -> R
     """Draw the report, as wide as the terminal."""
     parts: list[RenderableType] = [_head(facts)]
     if facts.known:
-        parts += [Text(), _who_sees_whom(facts, width), Text(), _participants(facts, width)]
+        parts += [Text(), _who_sees_whom(facts, width), Text(), _participants(facts)]
     parts += [Text(), _around(facts), Text(), _findings(found)]
     return Group(*parts)
 
@@ -54,51 +50,40 @@ def _add(table: Table, *cells: str | Text) -> None:
 
 
 def _who_sees_whom(facts: SystemFacts, width: int) -> RenderableType:
-    """Draw the matrix: a row for each who sees, a column for each who is seen, with the round trips in ms."""
-    every = [one.name for one in facts.known]
+    """Draw the matrix: a row for each who sees, a column for each who is seen, with the round trips in ms.
+
+    Where there is no room for names the columns have numbers, and there are none for those who answer nothing.
+    """
     rows: dict[str, list[Cell]] = {}
     for cell in matrix(facts):
         rows.setdefault(cell.viewer, []).append(cell)
-    longest = max(map(len, (HERE, *rows)))
-    fits = longest + 6 + 4 * len(every) <= width
-    names = every if fits else [name for name in every if name in rows]
-    is_wide = longest + 6 + sum(max(6, len(name)) + 2 for name in names) <= width
-    with_trips = longest + 6 + 8 * len(names) <= width
-    table = _table("sees", *(name if is_wide else str(number) for number, name in enumerate(names, 1)))
-    title = Text("Who sees whom" + (", with round trips in ms" if with_trips else ""), style="bold")
+    every = [one.name for one in facts.known]
+    has_room = sum(max(6, len(name)) + 2 for name in (max(rows, key=len), *every)) <= width
+    names = every if has_room else [name for name in every if name in rows]
+    numbers = {name: "" if has_room else f"{number} " for number, name in enumerate(names, 1)}
+    table = _table("sees", *(name if has_room else number.strip() for name, number in numbers.items()))
     for viewer, cells in rows.items():
-        number = "" if is_wide or viewer == HERE else f"{names.index(viewer) + 1} "
-        _add(table, number + viewer, *(_cell(cell, with_trips) for cell in cells if cell.other in names))
-    columns = names if is_wide else ()
-    unlisted = [
-        f"{names.index(name) + 1} {name}" if name in names else name
-        for name in every
-        if name not in (*rows, *columns)
-    ]
-    return Group(title, table, *([Text(f"seen, too: {', '.join(unlisted)}")] if unlisted else []))
+        _add(table, numbers.get(viewer, "") + viewer, *(_cell(cell) for cell in cells if cell.other in names))
+    others = [name for name in every if name not in names]
+    title = Text("Who sees whom, with round trips in ms", style="bold")
+    return Group(title, table, *([Text(f"seen, too: {', '.join(others)}")] if others else []))
 
 
-def _cell(cell: Cell, with_trips: bool) -> Text:
+def _cell(cell: Cell) -> Text:
     match cell.sees:
         case "itself":
             return Text("·", style="dim")
         case "needless":
             return Text("-", style="dim")
         case "no":
-            return Text("NO" if with_trips else "N", style=STYLES["wrong"])
+            return Text("NO", style=STYLES["wrong"])
         case "unknown":
             return Text("?", style=STYLES["doubtful"])
-    if cell.trip is None or not with_trips:
-        return Text("yes" if with_trips else "y")
-    return Text(f"{1000 * cell.trip:.1f}")
+    return Text("yes" if cell.trip is None else f"{1000 * cell.trip:.1f}")
 
 
-def _participants(facts: SystemFacts, width: int) -> RenderableType:
-    is_wide = width >= WIDE
-    more = ("Python", "dropped") if is_wide else ()
-    table = _table("participant", "machine", "clock", "up", "gaps", "lost", "Engage", *more)
-    for column in (table.columns[0], table.columns[2]):
-        column.no_wrap = width >= NARROW
+def _participants(facts: SystemFacts) -> RenderableType:
+    table = _table("participant", "machine", "clock", "up", "gaps", "lost", "dropped", "Engage", "Python")
     clocks = {each.clock: each for each in facts.clocks}
     for one in facts.known:
         if one.status is None:
@@ -109,8 +94,8 @@ def _participants(facts: SystemFacts, width: int) -> RenderableType:
         clock = clocks.get(status.at.clock)
         apart = "same" if clock is None else f"{-clock.offset:+.3f} s ± {1000 * clock.error:.1f} ms"
         up = _time(status.at.seconds - status.joined.seconds)
-        cells = (one.name, process.host or "?", apart, up, str(bus.gaps), str(bus.lost), status.version)
-        _add(table, *cells, *((process.python or "?", str(bus.dropped)) if is_wide else ()))
+        counts = (str(bus.gaps), str(bus.lost), str(bus.dropped))
+        _add(table, one.name, process.host or "?", apart, up, *counts, status.version, process.python or "?")
     return Group(Text("Participants", style="bold"), table)
 
 
@@ -173,7 +158,7 @@ def _sight(facts: SystemFacts) -> str:
 
 def _findings(found: Sequence[Diagnosis]) -> RenderableType:
     if not found:
-        return Text("Nothing is wrong.", style="bold green")
+        return GOOD
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), show_header=False)
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
@@ -181,7 +166,5 @@ def _findings(found: Sequence[Diagnosis]) -> RenderableType:
         _add(table, Text(finding.severity, style=STYLES[finding.severity]), f"{finding.where}: {finding.what}")
         _add(table, "", Text(f"→ {finding.do}", style="dim"))
     wrong = sum(finding.severity == "wrong" for finding in found)
-    if not wrong:
-        return Group(table, Text(), Text("Nothing is wrong.", style="bold green"))
     told = "1 thing is wrong." if wrong == 1 else f"{wrong} things are wrong."
-    return Group(table, Text(), Text(told, style=STYLES["wrong"]))
+    return Group(table, Text(), Text(told, style=STYLES["wrong"]) if wrong else GOOD)

@@ -6,7 +6,6 @@ from typing import Literal
 from msgspec import Struct
 
 from engage_hri.schemas.units import (
-    Degrees,
     Meters,
     Probability,
     Radians,
@@ -95,9 +94,3 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     def speech_only(self) -> bool:
         """True if the robot is to say the task's words and to do nothing else."""
         return self.condition == "degraded-generation"
-
-    def head_cost(self, degrees: Degrees) -> Seconds:
-        return self.seconds_per_head_degree * degrees
-
-    def arm_cost(self, degrees: Degrees) -> Seconds:
-        return self.seconds_per_arm_degree * degrees

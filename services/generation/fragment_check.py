@@ -1,23 +1,211 @@
-"""Checks of a fragment before anything of it is performed: it is sound, and the world knows all that it names.
+"""Fragments against the world: ids are spelled as it has them, words stand for what it lacks, a bad one is refused.
 
-A bad fragment is refused as a whole, and the fault says where it is wrong.
+Between the writing of a fragment and its performance an object may leave, and a model may name what never was there.
+A speaker says the words all the same: nothing else of the fragment is lost. Only a fragment of which nothing at all
+could be performed is refused, as a whole, and the fault says where it is wrong; a piece of a turn never is, for that
+would cost the rest of the turn. Pure.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Set
 from contextlib import contextmanager
+from string import ascii_letters, digits
+from typing import Literal, NamedTuple
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.advice import suggestion
-from engage_hri.schemas.behaviors import Reference
+from engage_hri.schemas.advice import in_other_letters, meant, suggestion
+from engage_hri.schemas.behaviors import (
+    FragmentBehavior,
+    Gaze,
+    GazeShift,
+    HeadDirectionShift,
+    Pointing,
+    Reference,
+    Speech,
+    SpeechOption,
+    Wait,
+)
 from engage_hri.schemas.check import validated
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.schemas.references import SyncRef
+from engage_hri.schemas.references import SyncRef, rewritten
 from engage_hri.schemas.tool import in_call
 from engage_hri.schemas.world import World
-from engage_hri.services.generation.lost import bearable, left_unsaid
-from engage_hri.services.generation.names import known, names, spelled, unknown
+from engage_hri.services.generation.references.phrases import noun_in
+from engage_hri.services.text.ear import heard, is_spoken
+from engage_hri.services.text.pieces import Piece, problems
+
+Kind = Literal["entity", "object", "person"]
+"""What may be named somewhere: whatever there is, the robot included; an object; a person."""
+Ids = Mapping[Kind, Mapping[str, str]]
+"""Ids, each with what it is, by where they may stand."""
+Aimed = Gaze | GazeShift | HeadDirectionShift | Pointing
+
+
+class Name(NamedTuple):
+    """An id in a fragment. path: its JSON path. line: of the XML source; 0: there is none."""
+
+    id: str
+    kind: Kind
+    path: str
+    line: int
+
+
+def known(world: World, robot: str) -> Ids:
+    """The ids that there are. robot: its actor id, which may be looked at, too."""
+    return {
+        "entity": {robot: "robot"} | {each.id: each.kind for each in world.entities},
+        "object": {each.id: each.kind for each in world.objects},
+        "person": {each.id: each.kind for each in world.people},
+    }
+
+
+def unknown(id: str, kind: Kind, ids: Ids) -> str:
+    """Say in words that there is nothing of this id where `kind` is needed."""
+    if (found := ids["entity"].get(id)) is not None:
+        return f"{id!r} is a {found}, and no {kind} (`refer` takes objects)"
+    return f"the world does not know {'the object ' if kind == 'object' else ''}{id!r}"
+
+
+def renamed(fragment: TurnFragment, name: Callable[[Name], str]) -> TurnFragment:
+    """The fragment with `name(each)` in place of each id. What is empty names nothing."""
+
+    def named(id: str, kind: Kind, path: str, line: int) -> str:
+        return name(Name(id, kind, path, line)) if id else id
+
+    def option(each: SpeechOption, path: str, line: int) -> SpeechOption:
+        ids = [
+            named(id, "object", f"{path}.distractors[{place}]", each.line or line)
+            for place, id in enumerate(each.distractors)
+        ]
+        return replace(each, distractors=tuple(ids))
+
+    def behavior(each: FragmentBehavior, path: str) -> FragmentBehavior:
+        if isinstance(each, Aimed):
+            return replace(each, target=named(each.target, "entity", f"{path}.target", each.line))
+        if not isinstance(each, Reference):
+            return each
+        options = [option(one, f"{path}.options[{n}]", each.line) for n, one in enumerate(each.options or ())]
+        target = named(each.target, "object", f"{path}.target", each.line)
+        return replace(each, target=target, options=None if each.options is None else tuple(options))
+
+    return replace(
+        fragment,
+        behaviors=tuple(behavior(each, f"$.behaviors[{n}]") for n, each in enumerate(fragment.behaviors)),
+        addressee=named(fragment.addressee, "person", "$.addressee", fragment.line),
+        delay_target=named(fragment.delay_target, "entity", "$.delay_target", fragment.line),
+    )
+
+
+def names(fragment: TurnFragment) -> list[Name]:
+    """All ids that a fragment names, in order."""
+    found: list[Name] = []
+
+    def note(name: Name) -> str:
+        found.append(name)
+        return name.id
+
+    renamed(fragment, note)
+    return found
+
+
+def spelled(fragment: TurnFragment, ids: Ids) -> tuple[TurnFragment, tuple[str, ...]]:
+    """The fragment with ids as the world spells them, and a warning if it had other letters."""
+    others: list[Piece] = []
+
+    def as_known(name: Name) -> str:
+        if name.id in ids[name.kind] or not (meant := in_other_letters(name.id, ids[name.kind])):
+            return name.id
+        others.append(Piece("left", name.id, 0, 0, "case"))
+        return meant
+
+    return renamed(fragment, as_known), problems(others)
+
+
+_NAME = f"{ascii_letters}{digits}_"
+"""Characters of the name of a sync point; an offset may follow it."""
+
+
+def bearable(fragment: TurnFragment, world: World, robot: str) -> tuple[TurnFragment, tuple[str, ...]]:
+    """The fragment without what the world does not know, with words in place of references to it, and warnings.
+
+    Ids are spelled as the world spells them. Phrases that have no words, such as an emoji alone, are left out, too:
+    they name nothing.
+    """
+    ids = known(world, robot)
+    fragment, told = spelled(fragment, ids)
+    warnings = list(told)
+    behaviors = [_bearable(each, ids, warnings) for each in fragment.behaviors]
+    is_piece = fragment.turn_status in ("beginning", "middle", "end")
+    pairs = zip(fragment.behaviors, behaviors, strict=True)
+    if not is_piece and not any(_is_performed(after) for before, after in pairs if type(after) is type(before)):
+        return fragment, told  # what it names is refused, if that is wrong
+    delay = fragment.delay_target
+    if delay and delay not in ids["entity"]:
+        warnings.append(f"{_unknown(delay, 'entity', ids)}; the robot looks elsewhere while it is silent")
+        delay = ""
+    left_out = {each.id for each in set(behaviors) - set(fragment.behaviors) if isinstance(each, Wait)}
+    changed = replace(fragment, behaviors=tuple(behaviors), delay_target=delay)
+    return _retied(changed, left_out) if left_out else changed, tuple(warnings)
+
+
+def left_unsaid(fragment: TurnFragment) -> tuple[str, ...]:
+    """Say what of a fragment's words is for the eye alone, and so is not said."""
+    speeches = [each for each in fragment.behaviors if isinstance(each, Speech)]
+    return tuple(f"{each.id}: {problem}" for each in speeches for problem in heard(each.text).problems)
+
+
+def _is_performed(behavior: FragmentBehavior) -> bool:
+    return is_spoken(behavior.text) if isinstance(behavior, Speech) else True
+
+
+def _bearable(behavior: FragmentBehavior, ids: Ids, warnings: list[str]) -> FragmentBehavior:
+    """The behavior, or what is done in its place; a wait takes no time, but others may be tied to it."""
+    if isinstance(behavior, Reference):
+        behavior = _with_words(behavior, ids, warnings)
+        return behavior if behavior.target in ids["object"] else _as_speech(behavior, ids, warnings)
+    if isinstance(behavior, Aimed) and behavior.target not in ids["entity"]:
+        warnings.append(f"{behavior.id}: {_unknown(behavior.target, 'entity', ids)}; left out")
+        begins = tuple(each for each in behavior.timing if each.sync == "start")
+        return Wait(id=behavior.id, duration=0.0, timing=begins, line=behavior.line)
+    return behavior
+
+
+def _with_words(reference: Reference, ids: Ids, warnings: list[str]) -> Reference:
+    """The reference with phrases that have words, to be told apart from objects that there are."""
+    kept = []
+    for each in reference.options or ():
+        if each.text.strip() and not is_spoken(each.text):
+            warnings.append(f"{reference.id}: no words in {each.text!r}")
+            continue
+        if gone := [id for id in each.distractors if id not in ids["object"]]:
+            told = "; ".join(_unknown(id, "object", ids) for id in gone)
+            warnings.append(f"{reference.id}: {told}; not taken for another one")
+            each = replace(each, distractors=tuple(id for id in each.distractors if id in ids["object"]))
+        kept.append(each)
+    return reference if tuple(kept) == (reference.options or ()) else replace(reference, options=tuple(kept) or None)
+
+
+def _as_speech(reference: Reference, ids: Ids, warnings: list[str]) -> Speech:
+    text = next((each.text for each in reference.options or () if is_spoken(each.text)), noun_in(reference.target))
+    how = f"only said: {text!r}" if text else "left out"
+    warnings.append(f"{reference.id}: {_unknown(reference.target, 'object', ids)}; {how}")
+    return Speech(id=reference.id, text=text, timing=reference.timing, line=reference.line)
+
+
+def _retied(fragment: TurnFragment, gone: Set[str]) -> TurnFragment:
+    """The fragment tied to the start of what is left out where it was tied to another point of that."""
+
+    def to_start(ref: str) -> str:
+        id, _, rest = ref.partition(":")
+        return f"{id}:start{rest.lstrip(_NAME)}" if id in gone else ref
+
+    return rewritten(fragment, to_start)
+
+
+def _unknown(id: str, kind: Kind, ids: Ids) -> str:
+    return f"{unknown(id, kind, ids)}{'' if id in ids['entity'] else meant(id, ids[kind])}"
+
 
 EMPTY = "the world is empty"
 """Advice where there is nothing that could be named."""
@@ -41,7 +229,12 @@ def checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
     world.
     """
     with _places_as_written(fragment):
-        return _checked(fragment, world, robot)
+        fragment = validated(fragment)
+        _check_names(fragment, world, robot)
+        for index, behavior in enumerate(fragment.behaviors):
+            if isinstance(behavior, Reference):
+                _check_timing(fragment, index, behavior)
+        return replace(fragment, addressee=addressee(fragment, world), delay_target=_delay_target(fragment, world))
 
 
 def check_world(fragment: TurnFragment, world: World, robot: str) -> None:
@@ -58,15 +251,6 @@ def _places_as_written(fragment: TurnFragment) -> Iterator[None]:
     except InputRefused as error:
         fault = replace(error.fault, where=in_call(error.fault.where, fragment))
         raise InputRefused(fault, error.block) from error
-
-
-def _checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
-    fragment, _ = spelled(validated(fragment), known(world, robot))
-    _check_names(fragment, world, robot)
-    for index, behavior in enumerate(fragment.behaviors):
-        if isinstance(behavior, Reference):
-            _check_timing(fragment, index, behavior)
-    return replace(fragment, addressee=addressee(fragment, world), delay_target=_delay_target(fragment, world))
 
 
 def _check_names(fragment: TurnFragment, world: World, robot: str) -> None:

@@ -30,9 +30,8 @@ from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
 from engage_hri.schemas.requests import Accepted, Heard, Refused
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
-from engage_hri.services.bus.sight import Sight
-from engage_hri.services.generation.body_link import BodyLink, planned
-from engage_hri.services.generation.choosing_again import (
+from engage_hri.services.bus.deadlines import Sight, Silences
+from engage_hri.services.generation.acts import (
     barred,
     changed,
     first_that_differs,
@@ -43,22 +42,17 @@ from engage_hri.services.generation.choosing_again import (
     without,
 )
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.exchange import NAME, CancelRequest, NoAnswer, SendRequest
-from engage_hri.services.generation.fragment_check import check_world, performable
+from engage_hri.services.generation.exchange import NAME, CancelRequest, NoAnswer, SendRequest, Way, Ways
+from engage_hri.services.generation.fragment_check import bearable, check_world, performable
 from engage_hri.services.generation.head.arbiter import Arbiter
-from engage_hri.services.generation.head.inhibitions import Leases
-from engage_hri.services.generation.lost import bearable
+from engage_hri.services.generation.inhibitions import Leases, Permits
 from engage_hri.services.generation.performance import Ended, FragmentPerformance, GazesOfFragments
-from engage_hri.services.generation.permits import Permits
-from engage_hri.services.generation.pipeline import glance, planning, targets
-from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
+from engage_hri.services.generation.pipeline import BodyLink, glance, planned_in_slices, planning, targets
+from engage_hri.services.generation.references.phrases import NO_DISCOURSE, Discourse
 from engage_hri.services.generation.references.policy import Unreferable
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
-from engage_hri.services.generation.turns.events import TurnEvents, TurnOutcomes
-from engage_hri.services.generation.turns.heard import HeardWords
+from engage_hri.services.generation.turns.outcomes import HeardWords, TurnEvents, TurnOutcomes
 from engage_hri.services.generation.turns.policy import Aborted, TurnPlan, TurnPolicy
-from engage_hri.services.generation.ways import Way, Ways
-from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.requests.serving import GRACE
 from engage_hri.services.runtime.intake import AnswerRequest, MachineClocks, PublishMessage, TellMistake
 
@@ -193,7 +187,7 @@ class Fragments:
 
     def body_lost(self) -> None:
         """Forget the body: another one may come."""
-        self._body.forget()
+        self._body.capabilities = None
 
     def _follow(self, progress: SyncPointProgress) -> None:
         """Pass a sync point to its fragment, and tell the arbiter of its gazes when they really happen."""
@@ -363,7 +357,7 @@ class Fragments:
             heard, permitted, config = self._heard_in(turn), permits(), self._config
             reachable = without(motions, bars)
             try:
-                made = yield from planned(
+                made = yield from planned_in_slices(
                     planning(fragment, turn, world, body, reachable, permitted, config, before, heard)
                 )
             except Unreferable:
@@ -388,8 +382,7 @@ class Fragments:
         for message in performance.new_warnings():
             warning = WarningFeedback(block=performance.fragment.id, kind="POLICY", message=message)
             self._tell(PublishMessage(keys.FRAGMENT_FEEDBACK, warning))
-        named = [mention.object for mention in made.mentions]
-        self._discourse = self._heard_in(turn).naming(fragment.id, named)
+        self._discourse = self._heard_in(turn).naming(fragment.id, [each.object for each in made.made])
         performance.is_sent = True
         return True
 
@@ -421,7 +414,7 @@ class Fragments:
                 plan = planning(
                     fragment, turn, world, body.capabilities, without(motions, bars), permits, self._config
                 )
-                choices = (yield from planned(plan)).choices
+                choices = (yield from planned_in_slices(plan)).choices
             except Unreferable:
                 choices = ()
             if performance.is_over or performance.plan is None or performance.acts[-1] is not act:

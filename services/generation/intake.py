@@ -34,17 +34,16 @@ from engage_hri.schemas.recognition import ConnectionEvent, Statistics, session_
 from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused, Unreadable, kind_of
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import COVERED_FOR, CoveredObjects, World
-from engage_hri.services.bus.sight import Sight
+from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.exchange import NAME, AnswerCame, GenerationBegan, OwnSight, SendRequest
 from engage_hri.services.generation.fragment_check import lacks_people
 from engage_hri.services.generation.fragments import Fragments
 from engage_hri.services.generation.head.arbiter import Arbiter
-from engage_hri.services.generation.head.inhibitions import Leases
+from engage_hri.services.generation.inhibitions import Leases
 from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports
 from engage_hri.services.reports.in_force import Publisher, WorldReport
 from engage_hri.services.reports.ongoing_actions import GoesOn, TimedReport
-from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.runtime.intake import AnswerRequest, Input, MachineClocks, PublishMessage, TellMistake
 
 WORLD_PATIENCE: Seconds = 5.0

@@ -35,10 +35,10 @@ from engage_hri.services.generation.acts import (
     unshown,
 )
 from engage_hri.services.generation.block.emission import FragmentPlan
-from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.inhibitions import Permits
 from engage_hri.services.generation.references.policy import Unreferable
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
-from engage_hri.services.generation.turns.events import TurnEvents
+from engage_hri.services.generation.turns.outcomes import TurnEvents
 from engage_hri.services.generation.turns.policy import TurnPlan
 from engage_hri.services.text.ear import is_spoken
 
@@ -187,9 +187,9 @@ class FragmentPerformance:
     @property
     def unmentioned(self) -> frozenset[str]:
         """Ids of the objects that the fragment was to refer to, and has not."""
-        mentions = [(mention, mention.by in act.reached) for act in self.acts for mention in act.plan.mentions]
-        said = {mention.object for mention, has_come in mentions if has_come}
-        return frozenset(mention.object for mention, _ in mentions) - said
+        meant = [(made, made.by in act.reached) for act in self.acts for made in act.plan.made]
+        said = {made.object for made, has_come in meant if has_come}
+        return frozenset(made.object for made, _ in meant) - said
 
     @property
     def moving(self) -> tuple[BlockBehavior, ...]:

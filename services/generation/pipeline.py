@@ -1,27 +1,42 @@
-"""Plan of a fragment, pure: phrases are proposed, the body is asked, references are chosen, the block is emitted."""
+"""Plan of a fragment, pure: phrases are proposed, the body is asked, references are chosen, the block is emitted.
+
+The body is asked what it is able to, and what the motions that references need would cost. Whoever asks is a
+generator, which yields the question and is sent the answer; None is a pause, in which others may work.
+"""
 
 from collections.abc import Callable, Generator, Sequence
-from contextlib import suppress
+from typing import Any, TypeVar
 
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import Reference
-from engage_hri.schemas.body import Capabilities, Estimate, EstimateItem
+from engage_hri.schemas import keys
+from engage_hri.schemas.behaviors import BlockBehavior, Hand, Reference
+from engage_hri.schemas.body import Capabilities, DescribeBody, Estimate, EstimateBehaviors, EstimateItem, Estimates
+from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.world import World
 from engage_hri.services.generation.block.emission import Emission, FragmentPlan
 from engage_hri.services.generation.block.ordering import ordered
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.permits import Permits
-from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
-from engage_hri.services.generation.references.motions import Motions, NotAsked, onward, onward_told
+from engage_hri.services.generation.exchange import Question
+from engage_hri.services.generation.inhibitions import Permits
+from engage_hri.services.generation.references.motions import (
+    Motions,
+    distinct,
+    from_here,
+    from_here_told,
+    last_motions,
+    onward,
+    onward_told,
+    pose_after,
+)
 from engage_hri.services.generation.references.pairs import ReferenceScene
-from engage_hri.services.generation.references.phrases import proposed
+from engage_hri.services.generation.references.phrases import NO_DISCOURSE, Discourse, proposed
 from engage_hri.services.generation.references.policy import Choices, choice, weigh
-from engage_hri.services.generation.references.posture import references_apart
-from engage_hri.services.generation.references.sequence import unasked
+from engage_hri.services.generation.references.sequence import references_apart, unasked
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.policy import TurnPlan, in_vain
+from engage_hri.services.runtime.steps import SLICE
 
 WORDS_BETWEEN = 3.0
 """Words of plain speech between two references over which head and arm stay at the first one's target; after more
@@ -77,11 +92,7 @@ def planning(
             answers = yield onward(ways, motions, permits.only_hand)
             assert answers is not None, "a question is sent its answers"
             motions = onward_told(ways, motions, answers)
-            with suppress(NotAsked):
-                chosen = yield from choice(tables, scene, motions, config, apart)
-                break
-        else:
-            chosen = yield from choice(tables, scene, motions, config, apart)
+        chosen = yield from choice(tables, scene, motions, config, apart)
         yield ELEMENTS
     emitted = Emission(fragment, turn, chosen.choices, config, permits, chosen.hands, before, apart).plan()
     return replace(emitted, warnings=(*in_vain(fragment), *made.warnings, *chosen.warnings, *emitted.warnings))
@@ -109,3 +120,62 @@ def _scene(world: World, body: Capabilities | None, permits: Permits, config: Ge
         no_gaze=permits.no_gaze,
         no_point=permits.no_point,
     )
+
+
+T = TypeVar("T")
+Asking = Generator[Question | None, Any, T]
+
+
+class BodyLink:
+    """Generation's knowledge of the body. capabilities: what it last said of itself; None: not asked yet."""
+
+    def __init__(self) -> None:
+        self.capabilities: Capabilities | None = None
+
+    def motions(
+        self, sequence: Sequence[str], hand: Hand | None, moving: Sequence[BlockBehavior] = (), glance: str = ""
+    ) -> Asking[Motions]:
+        """Costs, rays and poses of a look and a point at each target of the `sequence`, from where the body is.
+
+        hand: the only one allowed; None: either. moving: gazes and points under way, in order; they will be on target
+        before the references begin. glance: see `Motions`.
+        """
+        if not sequence:
+            return Motions({})
+        if self.capabilities is None:
+            described = yield DescribeBody()
+            if isinstance(described, Capabilities):
+                self.capabilities = described
+        last = last_motions(moving)
+        pose = pose_after(last, (yield from _estimates(last)))
+        each = distinct(sequence)
+        return from_here_told(each, (yield from _estimates(from_here(each, hand, pose, glance))), glance)
+
+
+def planned_in_slices(planning: Planning) -> Asking[FragmentPlan]:
+    """The plan that is being made, a slice at a time; its questions go to the body. Raises as they do."""
+    told: Sequence[Estimate] | None = None
+    done = SLICE  # to take in an answer was a slice of its own
+    while True:
+        if done >= SLICE:
+            done = 0
+            yield None
+        try:
+            asked = planning.send(told)
+        except StopIteration as end:
+            plan: FragmentPlan = end.value
+            return plan
+        told = None
+        if isinstance(asked, int):
+            done += asked
+        else:
+            told, done = (yield from _estimates(asked)), SLICE
+
+
+def _estimates(items: tuple[EstimateItem, ...]) -> Asking[tuple[Estimate, ...]]:
+    if not items:
+        return ()
+    answer = yield EstimateBehaviors(items=items)
+    if not isinstance(answer, Estimates) or len(answer.items) != len(items):
+        raise RunFailed(Fault(reason="the body's estimates do not fit the question", where=keys.ESTIMATE))
+    return answer.items

@@ -32,9 +32,9 @@ from engage_hri.services.generation.exchange import (
 )
 from engage_hri.services.generation.intake import GenerationIntake, reads
 from engage_hri.services.requests.ends import News, RequestDesk, Requester
-from engage_hri.services.runtime.alarm import Alarm
 from engage_hri.services.runtime.intake import AnswerRequest, Input, PublishMessage, TellMistake, input_of
-from engage_hri.services.runtime.noted import BusClock, NotedIntake
+from engage_hri.services.runtime.ledger import BusClock, NotedIntake
+from engage_hri.services.runtime.loop import Alarm
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 

@@ -29,10 +29,10 @@ from engage_hri.schemas.requests import Cancel, Outcome, Request, Unreadable
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.realizer.config import LEASE, RealizerConfig
-from engage_hri.services.realizer.perform.behavior_run import ABORT
-from engage_hri.services.realizer.perform.links import LONGEST_WAY, Presence
+from engage_hri.services.realizer.perform.behavior_run import ABORT, LONGEST_WAY
 from engage_hri.services.realizer.perform.net_stream import telling_of_turn
 from engage_hri.services.realizer.perform.performance import BlockPerformance, SharedContext
+from engage_hri.services.realizer.perform.recognition_link import Presence
 from engage_hri.services.realizer.perform.steering import Steering
 from engage_hri.services.realizer.plan.known import BLOCK_END, qualified
 from engage_hri.services.realizer.plan.plan import Plan
@@ -41,7 +41,7 @@ from engage_hri.services.realizer.together.live import Ending, Live, absence, to
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks, Past, WaitingBlock
 from engage_hri.services.realizer.together.planning import Planning
 from engage_hri.services.requests.ends import Patience, RequestDesk, Requester, unfinished
-from engage_hri.services.runtime.noted import NotedInputs
+from engage_hri.services.runtime.ledger import NotedInputs
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 

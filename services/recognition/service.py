@@ -7,8 +7,8 @@ from msgspec import Struct
 from engage_hri.schemas import keys
 from engage_hri.schemas.recognition import RequestEvent, SignalTurn, session_of
 from engage_hri.schemas.requests import Cancel
+from engage_hri.services.bus.deadlines import LATE
 from engage_hri.services.bus.interface import Bus, Received
-from engage_hri.services.bus.sight import LATE
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.intake import Intake, reads
 from engage_hri.services.requests.ends import RequestDesk
@@ -20,7 +20,7 @@ from engage_hri.services.runtime.intake import (
     WithdrawStates,
     input_of,
 )
-from engage_hri.services.runtime.noted import BusClock, NotedIntake
+from engage_hri.services.runtime.ledger import BusClock, NotedIntake
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 

@@ -1,4 +1,6 @@
-"""Form of a message in a recording: as JSON where that gives back the very bytes that came, else those bytes. Pure.
+"""Form of a recording: of the messages in it, and of what the recorder writes of its own. Pure.
+
+A message is kept as JSON where that gives back the very bytes that came, else as those bytes.
 
 Viewers of MCAP files understand JSON. MessagePack turns into JSON and back without a change, as long as its writer
 uses the shortest forms, and no number in it is infinite. This is tried for each message. Ours has a longer form for
@@ -8,9 +10,11 @@ structs of many fields: those come back through their type.
 from typing import Any, NamedTuple
 
 import msgspec
+from msgspec import Struct
 
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.messages import decode, encode
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.samples import Sample
 
 JSON, MSGPACK, XML, BYTES = "json", "msgpack", "xml", ""
@@ -71,3 +75,50 @@ def _is_json(data: bytes) -> bool:
     except _BAD:
         return False
     return True
+
+
+CHUNK, CLOCK, LOST, MORE = "recording/chunk", "recording/clock", "recording/lost", "recording/more"
+"""Topics of the recorder's own: the mark at the beginning of each chunk, offsets of clocks, messages that were lost,
+and all for which no channel is left."""
+
+
+class ChunkMark(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Mark at the beginning of a chunk, under the chunk's checksum: so none is told twice, moved, or of another file.
+
+    number: of the chunk in its recording, from 0. of: `wall` of the recording. facts: those of the recording, in
+    chunk 0.
+    """
+
+    number: int
+    of: str
+    facts: dict[str, str] = {}
+
+
+class Offset(Struct, frozen=True, kw_only=True):
+    """Offset of another clock to the recorder's, and its error."""
+
+    offset: Seconds
+    error: Seconds
+
+
+class MissingMessages(Struct, frozen=True, kw_only=True):
+    """Messages that are missing in a recording, up to now.
+
+    dropped: streams, and in a flood others, before they were taken. overflowed: by a full queue. lost: by a cut, and
+    nobody had them any more. disk: found no room on the disk. still: seconds for which the recorder stood still, as a
+    computer that sleeps: streams of that time, such as motion, are missing, and nobody can count them.
+    """
+
+    dropped: int = 0
+    overflowed: int = 0
+    lost: int = 0
+    disk: int = 0
+    still: Seconds = 0.0
+
+    @property
+    def total(self) -> int:
+        return self.dropped + self.overflowed + self.lost + self.disk
+
+
+OWN: dict[str, Any] = {CHUNK: ChunkMark, CLOCK: dict[str, Offset], LOST: MissingMessages}
+"""Type of what is JSON under each topic."""

@@ -32,10 +32,8 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.messages import Message as BusMessage
 from engage_hri.schemas.messages import decode
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.payloads import read_payload
-from engage_hri.services.bus.samples import Received, Sample
-from engage_hri.services.recording.form import StoredForm, payload
-from engage_hri.services.recording.losses import CHUNK, LOST, MORE, OWN, ChunkMark, MissingMessages
+from engage_hri.services.bus.samples import Received, Sample, read_payload
+from engage_hri.services.recording.form import CHUNK, LOST, MORE, OWN, ChunkMark, MissingMessages, StoredForm, payload
 from engage_hri.services.recording.writing import PROFILE, Line
 
 _HEAD = struct.Struct("<BQ")

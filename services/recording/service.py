@@ -15,8 +15,7 @@ from engage_hri.schemas.participants import AskStatus
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Sample, Tap
 from engage_hri.services.recording.disk import FULL_CHUNK, RecordingFile, Tell
-from engage_hri.services.recording.form import JSON, MSGPACK, kept
-from engage_hri.services.recording.losses import CLOCK, LOST, MORE, MissingMessages, Offset
+from engage_hri.services.recording.form import CLOCK, JSON, LOST, MORE, MSGPACK, MissingMessages, Offset, kept
 from engage_hri.services.recording.reading import BILLION
 from engage_hri.services.recording.writing import Line
 

@@ -16,7 +16,7 @@ from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, 
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, OpenEvents
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.samples import Received
-from engage_hri.services.recording.lanes import Annotation, Tier, apart
+from engage_hri.services.recording.annotations import Annotation, Tier, apart
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.times import RecordingTimes, messages
 from engage_hri.services.reports.ongoing_actions import ends

@@ -10,7 +10,7 @@ from msgspec import Struct
 from engage_hri.schemas.fragments import HeadOwner
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.samples import Received
-from engage_hri.services.recording.losses import CLOCK
+from engage_hri.services.recording.form import CLOCK
 from engage_hri.services.recording.reading import Recording
 
 

@@ -38,8 +38,7 @@ from mcap.writer import MCAP0_MAGIC
 from msgspec import Struct
 
 from engage_hri.schemas.export import bundle
-from engage_hri.services.recording.form import JSON
-from engage_hri.services.recording.losses import CHUNK, ChunkMark
+from engage_hri.services.recording.form import CHUNK, JSON, ChunkMark
 
 PROFILE = "engage"
 MOST_CHANNELS = 20_000

@@ -86,8 +86,19 @@ class _Reporter:
         self.floor = float("-inf")
 
 
-class Reporters:
-    """All reporters around `robot`, and what they say.
+FACE_GRACE: Seconds = 2.0
+"""Time for which a person may be out of sight, and come back under the same id, before the person has gone. Trackers
+lose faces for 0.5 to 2 s all day."""
+REPORT_GRACE: Seconds = 4.0
+"""Time for which what a reporter said holds after it has vanished, where no configuration says otherwise."""
+STRANGERS_KEPT = 256
+"""Number of programs of others whose name as a reporter is remembered."""
+Read = ActionEvent | OngoingActions | PeerAlive | PeerGone
+"""Messages of which it takes notice."""
+
+
+class ActionReports:
+    """The reports of actions, of all reporters around `robot`.
 
     grace: time for which what one has said holds after it has gone. clock: of local time. instant: local time of a
     stamp, at most now.
@@ -99,12 +110,41 @@ class Reporters:
         self._clock = clock
         self._instant = instant
         self._reporters: dict[str, _Reporter] = {}
+        self._strangers: OrderedDict[str, str] = OrderedDict()
+        """Names of reporters whose messages name no participant, by their life."""
+
+    def take(
+        self, message: object, key: str, source: str, life: str, now: Seconds, *, past: bool = False
+    ) -> list[TimedReport]:
+        """Take a message as it was received. Returns what follows, in order; nothing for what tells of no action."""
+        told = self.advance(now)
+        if isinstance(message, PeerAlive | PeerGone):
+            return told + self.feed(message, now)
+        if isinstance(message, ActionEvent | OngoingActions) and is_proper(message, key, source, self._robot):
+            name, of = self._named(key, source, life)
+            return told + self.hear(message, name, of, now, past=past)
+        return told
+
+    def _named(self, key: str, source: str, life: str) -> tuple[str, str]:
+        """Name and life of who tells of actions. The robot's are told by its body, whoever speaks for it."""
+        is_event = key in (keys.PERCEIVED_ACTION, keys.RECOGNIZED_ACTION)
+        name = source if is_event else keys.reporter_of(key) or "control"
+        if source:
+            return name, life if name == source else ""
+        if is_event:
+            return self._strangers.get(life, ""), ""
+        if life and name != "control":
+            self._strangers[life] = name
+            self._strangers.move_to_end(life)
+            if len(self._strangers) > STRANGERS_KEPT:
+                self._strangers.popitem(last=False)
+        return name, ""
 
     # -- time ---------------------------------------------------------------------------------------------------
 
     @property
     def deadline(self) -> Seconds | None:
-        """Time at which `advance` has something to do."""
+        """Time at which `advance` has something to tell."""
         return min((due for one in self._reporters.values() if (due := self._due(one)) is not None), default=None)
 
     def _due(self, one: _Reporter) -> Seconds | None:
@@ -116,6 +156,7 @@ class Reporters:
         return None
 
     def advance(self, now: Seconds) -> list[TimedReport]:
+        """Let time pass. Returns what follows, in order."""
         told = []
         for one in self._reporters.values():
             due = self._due(one)
@@ -297,67 +338,6 @@ class Reporters:
         for name, one in tuple(self._reporters.items()):
             one.reports.pop(actor, None)
             self._clear(name)
-
-
-FACE_GRACE: Seconds = 2.0
-"""Time for which a person may be out of sight, and come back under the same id, before the person has gone. Trackers
-lose faces for 0.5 to 2 s all day."""
-REPORT_GRACE: Seconds = 4.0
-"""Time for which what a reporter said holds after it has vanished, where no configuration says otherwise."""
-STRANGERS_KEPT = 256
-"""Number of programs of others whose name as a reporter is remembered."""
-Read = ActionEvent | OngoingActions | PeerAlive | PeerGone
-"""Messages of which it takes notice."""
-
-
-class ActionReports:
-    """The reports of actions. robot, grace, clock, instant: as of `Reporters`."""
-
-    def __init__(self, robot: str, grace: Seconds, clock: str, instant: Callable[[Stamp], Seconds]) -> None:
-        self._robot = robot
-        self._reporters = Reporters(robot, grace, clock, instant)
-        self._strangers: OrderedDict[str, str] = OrderedDict()
-        """Names of reporters whose messages name no participant, by their life."""
-
-    @property
-    def deadline(self) -> Seconds | None:
-        """Time at which `advance` has something to tell."""
-        return self._reporters.deadline
-
-    def advance(self, now: Seconds) -> list[TimedReport]:
-        """Let time pass."""
-        return self._reporters.advance(now)
-
-    def take(
-        self, message: object, key: str, source: str, life: str, now: Seconds, *, past: bool = False
-    ) -> list[TimedReport]:
-        """Take a message as it was received. Returns what follows, in order; nothing for what tells of no action."""
-        told = self.advance(now)
-        if isinstance(message, PeerAlive | PeerGone):
-            return told + self._reporters.feed(message, now)
-        if isinstance(message, ActionEvent | OngoingActions) and is_proper(message, key, source, self._robot):
-            name, of = self._reporter(key, source, life)
-            return told + self._reporters.hear(message, name, of, now, past=past)
-        return told
-
-    def forget(self, actor: str) -> None:
-        """Drop a person who has been gone for long."""
-        self._reporters.forget(actor)
-
-    def _reporter(self, key: str, source: str, life: str) -> tuple[str, str]:
-        """Name and life of who tells of actions. The robot's are told by its body, whoever speaks for it."""
-        is_event = key in (keys.PERCEIVED_ACTION, keys.RECOGNIZED_ACTION)
-        name = source if is_event else keys.reporter_of(key) or "control"
-        if source:
-            return name, life if name == source else ""
-        if is_event:
-            return self._strangers.get(life, ""), ""
-        if life and name != "control":
-            self._strangers[life] = name
-            self._strangers.move_to_end(life)
-            if len(self._strangers) > STRANGERS_KEPT:
-                self._strangers.popitem(last=False)
-        return name, ""
 
 
 def events(told: Iterable[TimedReport], clock: str) -> Iterator[tuple[ActionEvent, Seconds]]:

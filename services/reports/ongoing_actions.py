@@ -13,7 +13,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.runtime.absent import Absent
+from engage_hri.services.bus.deadlines import Absent
 
 ActionEvent = ActionBegan | ActionEnded | ActorFound | ActorLost
 Which = tuple[str, str, tuple[str, ...]]

@@ -39,11 +39,9 @@ from engage_hri.schemas.requests import (
     kind_of,
 )
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.sight import Sight
+from engage_hri.services.bus.deadlines import FORGOTTEN_AFTER, Sight, Silences
 from engage_hri.services.requests.asking_table import TABLE, AskingAction, AskingEvent, AskingState
-from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.requests.serving_table import ANEW, unwieldy
-from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
 
 
 class PublishCommand(Struct, frozen=True):

@@ -41,15 +41,15 @@ from engage_hri.schemas.requests import (
     is_life_of,
 )
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.deadlines import Silences
 from engage_hri.services.bus.interface import Bus, Containing, Received, Subscription
 from engage_hri.services.bus.samples import sender_of
 from engage_hri.services.requests import asking, serving
 from engage_hri.services.requests.asking import Asking, Patience
 from engage_hri.services.requests.asking_table import AskingState
-from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.requests.serving import Serving
 from engage_hri.services.requests.serving_table import unwieldy
-from engage_hri.services.runtime.alarm import Alarm
+from engage_hri.services.runtime.loop import Alarm
 
 
 def borrowed(life: str, received: Received, server: str) -> Fault | None:

@@ -32,8 +32,7 @@ from engage_hri.schemas.requests import (
     kind_of,
 )
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.sight import LATE, Sight
-from engage_hri.services.requests.deadlines import Silences
+from engage_hri.services.bus.deadlines import LATE, Absent, Sight, Silences
 from engage_hri.services.requests.serving_table import (
     ANEW,
     TABLE,
@@ -46,7 +45,6 @@ from engage_hri.services.requests.serving_table import (
     event_of,
     key_of,
 )
-from engage_hri.services.runtime.absent import Absent
 
 MOST = 8 * 1024 * 1024
 """Bytes of the requests that are remembered, of all senders together."""

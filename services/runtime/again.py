@@ -18,8 +18,7 @@ from msgspec import Struct
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.participants import Step, Taken
 from engage_hri.services.bus.samples import Received
-from engage_hri.services.runtime.intake import Input, ServiceIntake
-from engage_hri.services.runtime.ledger import StepClock, fingerprint
+from engage_hri.services.runtime.intake import Input, ServiceIntake, StepClock, fingerprint
 
 Find = Callable[[str, int], Received | None]
 """Finds the message of a life by its number; None: it is not there."""

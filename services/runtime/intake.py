@@ -5,14 +5,22 @@ and gives back what is to be done. Its *shell* (`service.py`) decides nothing: i
 what comes back. Then the same inputs at the same instants give the same outputs, so that a test needs no bus, and a
 recording can be played to a service once more (`again.py`). Without that line between the two, an answer depends on
 which task the loop happened to run first, and nobody can say afterwards why a robot did what it did.
+
+What an intake took is a `Step` of the ledger (`ledger.py`): the input, what the clocks said, and a fingerprint of
+what it led to.
 """
 
 from collections.abc import Sequence
+from hashlib import blake2b
+from math import inf
 from typing import Any, Generic, Protocol, TypeVar
 
+import msgspec
 from msgspec import Struct
 
+from engage_hri.schemas import keys
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.participants import ReadClock, Step
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.samples import Received
 
@@ -93,3 +101,49 @@ class ServiceIntake(Protocol):
     def advance(self, now: Seconds, /) -> Sequence[Struct]:
         """Carry out what is due by now."""
         ...
+
+
+REPEATED = ("evt", "state")
+"""Classes of keys whose messages a recorder has from their senders."""
+
+
+def step_of(input: Input[Any], number: int, now: Seconds) -> Step:
+    """Make the step that took this input. number: of its message in its life; 0: it has none."""
+    at = None if input.at == now else input.at
+    if number and keys.key_class(input.key) in REPEATED:
+        return Step(now=now, life=input.life, number=number, at=at, past=input.past)
+    return Step(
+        now=now, life=input.life, key=input.key, source=input.source, content=input.message, at=at, past=input.past
+    )
+
+
+def fingerprint(outputs: Sequence[Struct]) -> str:
+    """Sixteen hexadecimal digits that stand for these outputs; empty for none. An exception counts as its text."""
+    if not outputs:
+        return ""
+    named = [(type(output).__name__, output) for output in outputs]
+    return blake2b(msgspec.msgpack.encode(named, enc_hook=repr), digest_size=8).hexdigest()
+
+
+class StepClock:
+    """Clocks as one step read them: of a life that is over. name: the own one."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._known: dict[str, ReadClock] = {}
+
+    def read(self, clocks: tuple[ReadClock, ...]) -> None:
+        """Take what the next step read. A clock that it did not is as it was."""
+        self._known |= {each.clock: each for each in clocks}
+
+    def local(self, stamp: Stamp, now: Seconds) -> Seconds:
+        if stamp.clock == self.name:
+            return stamp.seconds
+        known = self._known.get(stamp.clock)
+        return now if known is None or known.offset is None else stamp.seconds + known.offset
+
+    def error(self, clock: str) -> Seconds:
+        known = self._known.get(clock)
+        if known is None and clock == self.name:
+            return 0.0
+        return inf if known is None or known.error is None else known.error

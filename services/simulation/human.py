@@ -185,7 +185,7 @@ class Human:
             case BlockProgress(block=str(block), progress="end"):
                 self._observe(block, Ended(), now)
             case WordSpoken(block=block, word=word):
-                for text in _words(word):
+                for text in re.findall(r"[a-z']+", word.lower()):
                     nth = self._heard[block, text] = self._heard.get((block, text), 0) + 1
                     self._observe(block, Word(text, nth), now)
             case ActionBegan(actor=self._robot, action=action, targets=(target,)):
@@ -209,7 +209,3 @@ class Human:
         """Plan to do the acts from `at` on."""
         if acts:
             heappush(self._due, _Due(at, next(self._numbers), acts))
-
-
-def _words(text: str) -> list[str]:
-    return re.findall(r"[a-z']+", text.lower())

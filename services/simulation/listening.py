@@ -1,6 +1,8 @@
-"""A listening person: understands from the robot's words which piece goes where, and moves it there.
+"""People who listen: one moves pieces as the robot's words ask, another attends to the robot's gaze as well. Pure.
 
-Pure. Meant for managers without a plan that is known beforehand.
+Both are meant for managers without a plan that is known beforehand. The attentive one is for first meetings: it looks
+where the robot looks and points, meets its eyes, and answers with a nod or a yes; it knows no task but that of which
+it is told.
 """
 
 from collections.abc import Callable
@@ -8,7 +10,6 @@ from collections.abc import Callable
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.simulation.hearing import HeardSpeech, Hearing
 from engage_hri.services.simulation.human import (
     FACE,
     TABLE,
@@ -20,8 +21,11 @@ from engage_hri.services.simulation.human import (
     LookAt,
     Pause,
     Sit,
+    Start,
+    Stop,
     Withdraw,
 )
+from engage_hri.services.simulation.speech import THINKING, HeardSpeech, Hearing, speech
 
 COMES: tuple[Act, ...] = (LookAt(TABLE), Pause(0.8), Sit(), Pause(0.8), LookAt(FACE))
 GOES: tuple[Act, ...] = (LookAt(TABLE), Pause(1.0), LookAt(FACE), Pause(1.0), Leave())
@@ -78,3 +82,43 @@ class ListeningHuman(Human):
             return GOES
         lay = self._asked(utterance)
         return self.ACKNOWLEDGES if lay is None else (*moves(lay), Pause(0.2), LookAt(FACE))
+
+
+class AttentiveHuman(ListeningHuman):
+    """The attentive person. person: its id. sees: ids it can look at. asked: see `ListeningHuman`.
+
+    Delays: the means of Table 2.1.
+    """
+
+    ANSWERS: Seconds = 0.4
+    FOLLOWS: Seconds = 0.3
+    ACKNOWLEDGES: tuple[Act, ...] = (Start("nod"), Pause(0.5), Stop("nod"), LookAt(FACE))
+    AGREES: tuple[Act, ...] = (*speech("Yes."), LookAt(FACE))
+    """Answer to a question."""
+
+    def __init__(
+        self,
+        person: str,
+        sees: frozenset[str],
+        robot: str = "robot",
+        vary: Callable[[], Seconds] = lambda: 0.0,
+        asked: Callable[[HeardSpeech], Lay | None] = lambda utterance: None,
+    ) -> None:
+        super().__init__(asked, robot, vary)
+        self._person = person
+        self._sees = sees
+
+    def feed(self, message: Message, now: Seconds) -> None:
+        match message:
+            case ActionBegan(actor=self._robot, action="look" | "point" as action, targets=(target, *_)):
+                if target == self._person:
+                    self._react((LookAt(FACE),), self.FOLLOWS, now)
+                elif target in self._sees:
+                    self._react((LookAt(target, pointed=action == "point"),), self.FOLLOWS, now)
+        self._listen(message, now)
+
+    def _answer(self, utterance: HeardSpeech) -> tuple[Act, ...]:
+        if utterance.words == THINKING:
+            return ()
+        answer = super()._answer(utterance)
+        return self.AGREES if answer == self.ACKNOWLEDGES and utterance.is_question else answer

@@ -20,10 +20,9 @@ from engage_hri.services.client.people.perceived_person import PerceivedActions
 from engage_hri.services.client.people.shared_world import SharedWorld
 from engage_hri.services.reports.ongoing_actions import ActionEvent
 from engage_hri.services.runtime.service import Ready
-from engage_hri.services.simulation.attentive import AttentiveHuman
-from engage_hri.services.simulation.hearing import Ears
 from engage_hri.services.simulation.human import FACE, Act, Human, LookAt, Pause, Start, Stop
-from engage_hri.services.simulation.speaking import SpokenWords
+from engage_hri.services.simulation.listening import AttentiveHuman
+from engage_hri.services.simulation.speech import Ears, SpokenWords
 
 EXAMPLE = '{"entities": [{"id": "cup", "kind": "object", "position": [0.5, 0.1, 0.8], "category": "cup"}]}'
 ADVICE = f"for example {EXAMPLE}; places are in metres, at most {FARTHEST:.0e}"

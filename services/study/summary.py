@@ -1,16 +1,19 @@
-"""Summary of sessions, as tables for a terminal and for Markdown."""
+"""Summary of sessions, as tables for a terminal, for Markdown, and as CSV with always the same columns."""
 
+import csv
+import io
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from statistics import mean, stdev
 from typing import get_args
 
+import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas.behaviors import EventKind
 from engage_hri.schemas.recognition import KindStatistics
 from engage_hri.services.study.hypotheses import CAVEAT, HYPOTHESES, PEOPLE_CAVEAT, HypothesisResult
-from engage_hri.services.study.records import SessionRecord
+from engage_hri.services.study.records import EventRecord, SessionRecord
 
 KINDS: tuple[EventKind, ...] = get_args(EventKind)
 RESPONDED = tuple(kind for kind in KINDS if kind != "backchannel")
@@ -210,3 +213,52 @@ def mean_and_deviation(values: Sequence[float], digits: int) -> str:
         return MISSING
     middle = number(mean(values), digits)
     return f"{middle} ± {number(stdev(values), digits)}" if len(values) > 1 else middle
+
+
+EVENT_COLUMNS = EventRecord.__struct_fields__
+KIND_COLUMNS = ("count", "succeeded", "failed", "failure_rate", "delay_mean", "failed_delay_mean")
+SESSION_COLUMNS = (
+    "session", "condition", "seed", "finished", "reason", "duration", "completion_time", "events", "mtbce", "max_gap",
+    "adjacency_pairs_every", "eye_contact_first", "eye_contact_second", "eye_contact_last",
+    *(f"{kind}_{column}" for kind in KINDS for column in KIND_COLUMNS),
+)  # fmt: skip
+
+Cell = str | int | float | bool | None
+
+
+def events_csv(records: Iterable[EventRecord]) -> str:
+    return csv_table(EVENT_COLUMNS, (msgspec.structs.astuple(record) for record in records))
+
+
+def sessions_csv(records: Iterable[SessionRecord]) -> str:
+    return csv_table(SESSION_COLUMNS, map(_session, records))
+
+
+def findings_csv(found: Iterable[HypothesisResult]) -> str:
+    return csv_table(HypothesisResult.__struct_fields__, (msgspec.structs.astuple(finding) for finding in found))
+
+
+def _session(record: SessionRecord) -> list[Cell]:
+    eyes, numbers = record.eye_contact, record.statistics
+    return [
+        record.session, record.condition, record.seed, record.finished, record.reason, record.duration,
+        record.completion_time, numbers.events, numbers.mtbce, numbers.max_gap, record.adjacency_pairs_every,
+        *((eyes.first, eyes.second, eyes.last) if eyes else (None, None, None)),
+        *(getattr(record.of(kind), column) for kind in KINDS for column in KIND_COLUMNS),
+    ]  # fmt: skip
+
+
+def csv_table(columns: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
+    """A table as CSV. rows: numbers are written to the millionth, true and false in small letters."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([_cell(cell) for cell in row] for row in rows)
+    return text.getvalue()
+
+
+def _cell(cell: Cell) -> Cell:
+    """Write a cell: numbers to the millionth, `true` and `false` in small letters."""
+    if isinstance(cell, bool):
+        return "true" if cell else "false"
+    return round(cell, 6) + 0.0 if isinstance(cell, float) else cell  # + 0.0: no negative zero

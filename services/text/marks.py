@@ -23,7 +23,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.advice import in_other_letters, meant
 from engage_hri.services.text import patterns as mark
-from engage_hri.services.text.acts import LISTS
+from engage_hri.services.text.patterns import LISTS
 from engage_hri.services.text.pieces import Ids, Kind, Piece, Reason
 
 LOOK = 4000

@@ -1,8 +1,5 @@
 """What a router tells of Zenoh's log: what was refused, and nothing that was not."""
 
-import pytest
-
-from engage_hri.schemas.access import MOST_MESSAGES, MOST_PULSES, MOST_QUESTIONS
 from engage_hri.services.bus.zenoh.denials import LONGEST, MOST, Denials
 
 TRACE = "\x1b[2m2026-11-22T22:21:26.150311Z\x1b[0m \x1b[35mTRACE\x1b[0m  rx-0 ThreadId({}) \x1b[2mzenoh::net::routing::interceptor::access_control\x1b[0m: {}"  # noqa: E501
@@ -53,25 +50,6 @@ def test_a_denial_from_memory_is_told_with_the_name_that_was_heard_before() -> N
     cached = trace(f"Using cached result: 107387840e15874f6e7b603029be66a0 is unauthorized to Put (ingress) on {KEY}")
     assert told(checked("Query", un=""), cached) == [f"denied: robot/manager/bob may not put {KEY}"]
     assert told(cached) == [f"denied: process 107387840e15874f6e7b603029be66a0 may not put {KEY}"]
-
-
-@pytest.mark.parametrize(
-    ("what", "most", "words"), [("Put", MOST_MESSAGES, "messages"), ("Query", MOST_QUESTIONS, "questions")]
-)
-def test_who_sends_a_great_deal_that_is_allowed_is_told_by_name_in_the_first_tenth_and_hundredth_second(
-    what: str, most: int, words: str
-) -> None:
-    line = checked(what, un="")
-    seconds = [line.replace("22:21:26", f"22:{at // 60:02}:{at % 60:02}") for at in range(100)]
-    assert told(line, *[each for each in seconds for _ in range(most)]) == []
-    many = f"many: robot/manager/bob sends more than {most} {words} in a second"
-    assert told(line, *[each for each in seconds for _ in range(most + 1)]) == [
-        many, f"{many} (10 times)", f"{many} (100 times)",
-    ]  # fmt: skip
-
-
-def test_what_others_get_counts_for_nobody() -> None:
-    assert told(checked("Query", un=""), *[checked("Query", un="", flow="egress")] * 2 * MOST_QUESTIONS) == []
 
 
 def test_no_holder_makes_a_line_long_or_its_reading_slow() -> None:
@@ -151,49 +129,3 @@ def test_costly_keys_of_one_holder_hide_no_refused_link() -> None:
 def test_other_errors_of_zenoh_are_passed_on() -> None:
     assert told("2026-11-22T22:21:19Z ERROR acc-0 ThreadId(05) zenoh::x: no memory")[0].startswith("zenoh: 2026")
     assert not told("2026-11-22T22:21:19Z DEBUG acc-0 ThreadId(05) zenoh_link_tls::utils: Loading certificates", "")
-
-
-DROPPED = TRACE.replace("::access_control", "").format("08", "Msg intercepted!")
-
-
-def test_what_a_rule_allows_and_is_dropped_is_too_large() -> None:
-    cached = trace(f"Using cached result: 107387840e15874f6e7b603029be66a0 is authorized to Put (ingress) on {KEY}")
-    news = f"dropped: robot/manager/bob sends a put on {KEY} that is larger than may be sent"
-    assert told(checked("Put", un=""), DROPPED) == [news]
-    assert told(checked("Query", un=""), cached, DROPPED) == [news]
-    # On another thread, to a receiver who may not hear it, or after what is denied, it is no news.
-    assert not told(checked("Put", un="", thread=9), DROPPED)
-    assert not told(checked("Put", un=""), checked("Put", flow="egress"), DROPPED)
-    assert len(told(checked("Put"), DROPPED)) == 1
-
-
-def too_soon(second: int, process: str = "10738784", key: str = KEY) -> list[str]:
-    text = f"Message dropped by the downsampling interceptor: Push({key}) from:south:0:client/{process}:1"
-    line = TRACE.replace("access_control", "downsampling").format("08", text)
-    return [line.replace("21:26.150311Z", f"21:{second:02}.150311Z"), DROPPED]
-
-
-def test_what_comes_too_fast_is_told_with_the_name_once_for_each_second() -> None:
-    news = f"dropped: robot/manager/bob sends more on {KEY} than may come in a second"
-    flood = [line for second in range(10) for line in too_soon(second) * 100]
-
-    assert told(checked("Put", un=""), *flood) == [news, f"{news} (10 times)"]
-    assert told(*too_soon(1) * 100)[0].startswith("dropped: somebody sends more on")
-
-
-def test_messages_that_waited_together_are_no_flood() -> None:
-    """The router drops what follows too soon. Nobody is named before it was too much in one second on one key."""
-    few = [line for second in range(10) for line in too_soon(second) * MOST_PULSES]
-    of_many = [
-        line for number in range(100) for line in too_soon(1, f"{number:08}") + too_soon(1, key=f"key/{number}")
-    ]
-
-    assert told(checked("Put", un=""), *few, *of_many) == []
-    assert len(told(checked("Put", un=""), *few, *too_soon(9))) == 1
-
-
-def test_a_log_that_lies_about_threads_fills_no_memory() -> None:
-    denials = Denials(lambda line: None)
-    for number in range(5 * MOST):
-        denials.feed(f"x ThreadId({number}) {'y' * 100}".encode())
-    assert len(denials._before) <= MOST

@@ -8,7 +8,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused, NoReply
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Accepted
-from engage_hri.services.bus.answering import MOST, Answering
+from engage_hri.services.bus.interface import MOST_ANSWERS, Answering
 from engage_hri.services.bus.memory import MemoryHub
 from tests.bus.places import Place, echo
 
@@ -131,12 +131,12 @@ async def test_many_long_questions_are_answered_each(place: Place):
 
 async def test_no_more_are_taken_on_than_can_be_remembered() -> None:
     answering, slowly = Answering(MemoryHub().join("server")), Slowly()
-    for each in range(MOST):
-        assert not answering.is_full
+    for each in range(MOST_ANSWERS):
         answering.begin(slowly(Accepted(id=str(each))), "key")
-    assert answering.is_full
+    with pytest.raises(InputRefused):
+        answering.begin(slowly(Accepted(id="one more")), "key")
 
     answering.end()
     await asyncio.sleep(0.01)
 
-    assert not answering.is_full
+    answering.begin(slowly(Accepted(id="one more")), "key").cancel()

@@ -11,11 +11,10 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.messages import Message, encode
 from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.services.bus.interface import Keep, Received, Subscription
-from engage_hri.services.bus.zenoh import session
+from engage_hri.services.bus.zenoh import bridge as bridging
+from engage_hri.services.bus.zenoh.bridge import PLACES, Arrived
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.bus.zenoh.readers import LOOK
-from engage_hri.services.bus.zenoh.session import Arrived
-from engage_hri.services.bus.zenoh.turns import PLACES
 from tests.bus.places import PATIENCE, acquainted, free_endpoint, matched, messages, numbers, state
 
 BLOCK = zenoh.CongestionControl.BLOCK
@@ -62,7 +61,7 @@ async def test_a_flood_of_one_process_costs_the_others_nothing(monkeypatch: pyte
     for hub in hubs:
         await matched(hub, keys.FEEDBACK)
 
-    monkeypatch.setattr(session, "CROWD_OF_ONE", 1000 * session.EACH)
+    monkeypatch.setattr(bridging, "CROWD_OF_ONE", 1000 * bridging.EACH)
     for _ in range(3000):  # nothing runs on the loop meanwhile
         hubs[0].session.put(keys.FEEDBACK, encode(state(0)), encoding="application/msgpack", congestion_control=BLOCK)
     deadline = asyncio.get_running_loop().time() + PATIENCE
@@ -91,11 +90,11 @@ async def test_a_flood_of_one_process_costs_the_others_nothing(monkeypatch: pyte
 
 async def test_one_item_waits_for_a_share_of_a_flood_only():
     order: list[str] = []
-    bridge = session.LoopBridge(lambda error, what: None)
+    bridge = bridging.LoopBridge(lambda error, what: None)
     for number in range(5000):
         bridge._let_in_of("loud", 1, order.append, f"loud {number}")
     bridge._let_in_of("quiet", 1, order.append, "quiet")
-    for _ in range(5001 // session.BATCH + 2):
+    for _ in range(5001 // bridging.BATCH + 2):
         await asyncio.sleep(0)
 
     assert bridge.waiting == 0
@@ -118,7 +117,11 @@ async def test_a_token_overtakes_no_message_of_its_process_that_waits():
     for number in range(10 * PLACES):
         loud.publish(keys.FEEDBACK, state(number))
     deadline = asyncio.get_running_loop().time() + PATIENCE
-    while here.bridge.waiting < 10 * PLACES:  # nothing runs on the loop meanwhile
+
+    def waiting() -> int:
+        return sum(getattr(item, "key", "") == keys.FEEDBACK for _, item, *_ in list(here.bridge._ordered))
+
+    while waiting() < 10 * PLACES:  # nothing runs on the loop meanwhile
         assert asyncio.get_running_loop().time() < deadline
     loud._token.undeclare()
     loud._token = None
@@ -167,7 +170,8 @@ def test_a_full_queue_drops_of_the_loudest_and_never_who_comes_and_goes():
     for number in range(4):
         offer("quiet", state(number), number)
     for number in range(8):
-        offer("", PeerGone(participant=f"p{number}"), number)
+        name = f"p{number}"
+        inbox.offer(Received(keys.alive(name, "client"), PeerGone(participant=name), name, float(number)))
     for number in range(1000):
         offer("loud", state(number), number)
 
@@ -179,7 +183,7 @@ def test_a_full_queue_drops_of_the_loudest_and_never_who_comes_and_goes():
 
 
 async def test_the_lag_of_the_loop_is_that_of_the_first_that_waited_whatever_came_after_it():
-    bridge, taken, loop = session.LoopBridge(lambda error, text: None), [], asyncio.get_running_loop()
+    bridge, taken, loop = bridging.LoopBridge(lambda error, text: None), [], asyncio.get_running_loop()
     until = loop.time() + 0.05
 
     bridge._let_in(taken.append, 1)

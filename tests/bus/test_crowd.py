@@ -1,7 +1,8 @@
 """Who has too many links or tokens at a router: counted by certificate, cut at the bound, let in again later."""
 
 from engage_hri.schemas.access import Holder
-from engage_hri.services.bus.zenoh.crowd import BANNED, GOING, MOST_LINKS, MOST_TOKENS, MOST_UNREAD, Crowd, Link
+from engage_hri.services.bus.zenoh.router import BANNED, MOST_LINKS, MOST_TOKENS, MOST_UNREAD, Crowd
+from engage_hri.services.bus.zenoh.volume import Link
 
 ALICE = Holder(robot="robot", role="manager", name="alice")
 BOB = Holder(robot="robot", role="manager", name="bob")
@@ -27,82 +28,19 @@ def test_one_link_more_than_the_bound_ends_all_of_that_certificate_and_no_other(
 CONTROL = Holder(robot="robot", role="control", name="control")
 
 
-def test_of_a_service_the_first_link_stays_and_only_that_one_comes_again() -> None:
+def test_a_service_that_has_too_many_is_told_once_and_keeps_its_links() -> None:
     """Somebody else with its keys shows tokens of processes that are none: the service itself goes on."""
     crowd = Crowd((CONTROL,))
-    own, *others = (link(CONTROL, number) for number in range(3))
-    for each in (own, *others):
-        crowd.came(each, 0.0)
-    said = [crowd.shown(f"{CONTROL.mark}{number}", "token", 0.0) for number in range(MOST_LINKS + 1)]
+    for number in range(MOST_LINKS):
+        crowd.came(link(CONTROL, number), 0.0)
+    said = [crowd.shown(f"{CONTROL.mark}{number}", "token", 0.0) for number in range(MOST_LINKS + 2)]
 
-    assert said[:-1] == [("", ())] * MOST_LINKS
-    assert "its links end but for the first" in said[-1][0]
-    assert said[-1][1] == tuple(others)
-    for each in others:
-        crowd.went(each)
-    for number in range(1, MOST_LINKS + 1):
-        crowd.withdrawn(f"{CONTROL.mark}{number}", "token")
-    assert crowd.still(GOING) == ("", ())
-    assert crowd.is_banned(link(CONTROL, 7), 2.0)
-    crowd.went(own)
-    assert not crowd.is_banned(own, 2.0)
-    assert crowd.came(own, 2.0) == ("", ())
-    assert crowd.came(link(CONTROL, 7), BANNED - 0.1) == ("", (link(CONTROL, 7),))
-
-
-def test_a_service_whose_last_link_still_shows_too_many_loses_that_too() -> None:
-    crowd = Crowd((CONTROL,))
-    crowd.came(link(CONTROL, 0), 0.0)
-    for number in range(MOST_LINKS + 1):
-        crowd.shown(f"{CONTROL.mark}{number}", "token", 0.0)
-
-    line, ended = crowd.still(GOING)
-
-    assert ended == (link(CONTROL, 0),)
-    assert CONTROL.common_name in line
-    crowd.went(link(CONTROL, 0))
-    assert crowd.is_banned(link(CONTROL, 0), BANNED - 0.1)
-    assert crowd.still(2 * GOING) == ("", ())
-
-
-def test_a_look_for_another_does_not_judge_a_service_before_its_time() -> None:
-    crowd = Crowd((CONTROL,))
-    crowd.came(link(CONTROL, 0), 0.0)
-    for number in range(MOST_LINKS + 1):
-        crowd.shown(f"{CONTROL.mark}{number}", "token", 4.9)
-
-    assert crowd.still(GOING) == ("", ())
-    assert crowd.still(4.9 + GOING)[1] == (link(CONTROL, 0),)
-
-
-def test_the_same_process_comes_back_though_its_old_link_still_counts() -> None:
-    crowd = Crowd((CONTROL,))
-    own = link(CONTROL, 0)
-    crowd.came(own, 0.0)
-    for number in range(MOST_LINKS + 1):
-        crowd.shown(f"{CONTROL.mark}{number}", "token", 0.0)
-    again = own._replace(address="tls/127.0.0.1:9999")
-
-    assert crowd.came(again, 1.0) == ("", ())
-    assert crowd.is_banned(link(CONTROL, 7), 1.0)
-
-
-def test_who_takes_the_place_of_a_spared_service_and_shows_too_many_loses_its_link() -> None:
-    crowd = Crowd((CONTROL,))
-    crowd.came(link(CONTROL, 0), 0.0)
-    crowd.came(link(CONTROL, 1), 0.0)
-    tokens = [f"{CONTROL.mark}{number}" for number in range(MOST_LINKS + 1)]
-    for each in tokens:
-        crowd.shown(each, "token", 0.0)
-    for number in range(2):
-        crowd.went(link(CONTROL, number))
-    for each in tokens:
-        crowd.withdrawn(each, "token")
-    crowd.came(link(CONTROL, 2), GOING)
-    said = [crowd.shown(each, "token", GOING) for each in tokens]
-
-    assert said[-1][1] == (link(CONTROL, 2),)
-    assert crowd.is_banned(link(CONTROL, 3), GOING + 1)
+    assert said[:-2] == [("", ())] * MOST_LINKS
+    told = f"too many: {CONTROL.common_name} has more than {MOST_LINKS} processes"
+    assert said[-2] == (f"{told}; a service of the robot keeps its links", ())
+    assert said[-1] == crowd.came(link(CONTROL, MOST_LINKS), 1.0) == ("", ())
+    assert not crowd.is_banned(link(CONTROL, 0), 1.0)
+    assert crowd.unread(link(CONTROL, 0), 1.0) == ("", ())
 
 
 def test_who_goes_makes_room() -> None:
@@ -201,18 +139,6 @@ def test_links_that_are_not_read_are_forgotten_after_a_while() -> None:
     crowd = Crowd((ALICE,))
     for number in range(3 * MOST_UNREAD):
         assert crowd.unread(link(ALICE, number), number * BANNED / MOST_UNREAD)[0].startswith("not read: ")
-
-
-def test_of_a_service_only_the_first_link_stays_when_it_is_not_read() -> None:
-    crowd = Crowd((CONTROL,))
-    own, other = link(CONTROL, 0), link(CONTROL, 1)
-    for each in (own, other):
-        crowd.came(each, 0.0)
-
-    assert crowd.unread(own, 0.0) == ("", ())
-    assert crowd.unread(other, 0.0)[1] == (other,)
-    crowd.went(own)
-    assert crowd.unread(other, 0.0) == ("", ())
 
 
 def test_a_link_that_is_not_read_stays_if_it_is_a_service_or_nobody_can_know_whose_it_is() -> None:

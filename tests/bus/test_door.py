@@ -9,8 +9,7 @@ import zenoh
 
 from engage_hri.schemas import keys
 from engage_hri.services.bus.zenoh import session as module
-from engage_hri.services.bus.zenoh.crowd import MOST_TOKENS
-from engage_hri.services.bus.zenoh.router import routing
+from engage_hri.services.bus.zenoh.router import MOST_TOKENS, routing
 from tests.bus.places import PATIENCE, free_endpoint
 
 pytestmark = pytest.mark.real_time

@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from engage_hri.schemas.units import A_DAY, span
-from engage_hri.services.bus.zenoh.expiry import REMEDY, Expiry
+from engage_hri.services.bus.keyring import REMEDY, Expiry
 from engage_hri.services.runtime.virtual_time import run_virtual
 
 BEGAN = 1_700_000_000.0

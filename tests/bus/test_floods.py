@@ -10,8 +10,8 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.requests import Refused, Unreadable
 from engage_hri.services.bus.interface import Bus, Subscription
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.bus.often import CALM, KINDS, MOST, Often
-from engage_hri.services.bus.zenoh.turns import PLACES, Turns
+from engage_hri.services.bus.samples import CALM, KINDS, MOST, Often
+from engage_hri.services.bus.zenoh.bridge import PLACES, Turns
 from engage_hri.services.requests.ends import RequestDesk
 from tests.random_cases import share_of
 

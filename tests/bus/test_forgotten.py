@@ -12,10 +12,11 @@ import pytest
 import zenoh
 
 from engage_hri.schemas import keys
+from engage_hri.services.bus.zenoh.bridge import LoopBridge
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.bus.zenoh.links import Forgotten
 from engage_hri.services.bus.zenoh.router import routing
-from engage_hri.services.bus.zenoh.session import LoopBridge, open_router
+from engage_hri.services.bus.zenoh.session import open_router
 from tests.bus.places import PATIENCE, acquainted, free_endpoint, messages, numbers, state
 
 pytestmark = pytest.mark.real_time

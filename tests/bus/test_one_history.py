@@ -17,10 +17,11 @@ from engage_hri.schemas.messages import encode, encoding_of
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Subscription
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.bus.zenoh.bridge import Arrived
 from engage_hri.services.bus.zenoh.history import pack
 from engage_hri.services.bus.zenoh.hub import ZenohHub
 from engage_hri.services.bus.zenoh.order import Envelope
-from engage_hri.services.bus.zenoh.session import Arrived, open_session
+from engage_hri.services.bus.zenoh.session import open_session
 from tests.bus.places import PATIENCE, MemoryPlace, Place, ZenohPlace, state, take
 from tests.random_cases import share_of
 

@@ -19,8 +19,8 @@ from engage_hri.schemas import access, keys
 from engage_hri.schemas.access import BESIDE, LARGEST, MOST_PULSES, OWN, Holder, most
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.bus.zenoh.router import routing
+from engage_hri.services.bus.zenoh.rules import MOST_IN_PARTS, bounded, paced
 from engage_hri.services.bus.zenoh.session import open_router
-from engage_hri.services.bus.zenoh.sizes import MOST_IN_PARTS, bounded, paced
 from tests.bus.places import PATIENCE, free_endpoint
 
 BLOCK = zenoh.CongestionControl.BLOCK

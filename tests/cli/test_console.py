@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.commandline.look import console, with_window
+from engage_hri.services.commandline.look import console
+from engage_hri.services.commandline.look import window as shown
 from engage_hri.services.commandline.look.console import kept_token
 from engage_hri.services.recording.disk import read
 from tests.bus.places import free_endpoint
@@ -120,9 +121,9 @@ def test_the_demo_opens_a_window_only_where_somebody_sees_it(
     monkeypatch.setenv("DISPLAY", display)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
 
-    assert with_window.can_open(terminal) is opens
-    monkeypatch.setattr(with_window, "NEEDED", ("no_such_package",))
-    assert with_window.can_open(terminal) is False
+    assert shown.can_open(terminal) is opens
+    monkeypatch.setattr(shown, "NEEDED", ("no_such_package",))
+    assert shown.can_open(terminal) is False
 
 
 @needs_console

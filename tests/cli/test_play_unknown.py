@@ -8,17 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Hub
-from engage_hri.services.commandline.embedding import in_memory, services
-from engage_hri.services.commandline.shell.config import Config
-from engage_hri.services.commandline.shell.sources import still
+from engage_hri.services.commandline.embedding import in_memory
+from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.commandline.talk import play
-from engage_hri.services.runtime.service import running
+from engage_hri.services.runtime.service import Service, running
 from tests.cli.command import Engage
 
 PLAY = ("play", "--embedded", "--virtual-time", "--outcomes", "-", "--quiet")
-NAMES = ("realizer", "recognition", "control", "generation")
 TEXT = "One two three four five six seven eight nine ten eleven twelve."
 FRAGMENT = f"""\
 <ebml:ebml xmlns:ebml="edu.wpi.ebml" xmlns="org.mindmakers.bml" id="count" turnIndex="1" turnStatus="full">
@@ -31,10 +28,10 @@ def mortal(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> s
     dying: str = request.param
 
     @asynccontextmanager
-    async def system(job: play.Job, config: Config, world: World) -> AsyncIterator[Hub]:
-        stays = services(config, *(name for name in NAMES if name != dying))
-        async with in_memory(config, {"simulation": still(world), **stays}) as hub, AsyncExitStack() as life:
-            await life.enter_async_context(running(hub, services(config, dying)))
+    async def system(config: RobotConfig, services: dict[str, Service]) -> AsyncIterator[Hub]:
+        dies_early = {dying: services.pop(dying)}
+        async with in_memory(config, services) as hub, AsyncExitStack() as life:
+            await life.enter_async_context(running(hub, dies_early))
 
             async def dies() -> None:
                 await asyncio.sleep(3.0)
@@ -44,7 +41,7 @@ def mortal(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> s
             yield hub
             await death
 
-    monkeypatch.setattr(play, "_private_system", system)
+    monkeypatch.setattr(play, "in_memory", system)
     return dying
 
 

@@ -9,7 +9,7 @@ from engage_hri.schemas.blocks import Block, SyncPointProgress
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.recognition import ConnectionEvent, EventState
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.commandline.talk.play_state import GRACE, Played
+from engage_hri.services.commandline.talk.played import GRACE, Played
 
 
 def event(state: EventState, kind: EventKind = "adjacency_pair", *, block: str = "ask") -> ConnectionEvent:

@@ -12,10 +12,10 @@ from rich.console import Console
 
 from engage_hri.services.commandline.shell.config import Config, load
 from engage_hri.services.commandline.study import session as playing
-from engage_hri.services.commandline.study import simulate, workers
-from engage_hri.services.commandline.study.session import Order, SessionResult, play
+from engage_hri.services.commandline.study import session as workers
+from engage_hri.services.commandline.study import simulate
+from engage_hri.services.commandline.study.session import Order, SessionResult, play, play_all
 from engage_hri.services.commandline.study.tables import FILES, PLOTS, grid
-from engage_hri.services.commandline.study.workers import play_all
 from engage_hri.services.runtime.virtual_time import Deadlock
 from engage_hri.services.study import summary
 from engage_hri.services.study.hypotheses import HypothesisResult

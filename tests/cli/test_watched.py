@@ -15,8 +15,8 @@ import pytest
 import zenoh
 
 from engage_hri.schemas import keys
-from engage_hri.services.commandline.robot import child_watch as module
-from engage_hri.services.commandline.robot.child_watch import SIGN, watched
+from engage_hri.services.commandline.robot import router as module
+from engage_hri.services.commandline.robot.router import SIGN, watched
 from tests.bus.places import free_endpoint
 from tests.cli.command import start
 from tests.cli.test_processes import PATIENCE, children, gone, line, stopped

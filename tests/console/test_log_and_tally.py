@@ -141,15 +141,6 @@ def test_the_tally_counts_each_event_once_by_its_decision() -> None:
     assert total.duration == pytest.approx(7.0)
 
 
-def test_the_summary_of_a_narrow_terminal_has_sentences_instead_of_a_table() -> None:
-    total = fed(tally.feed, tally.empty(10.0))
-    console = Console(width=60, record=True, file=StringIO())
-    console.print(tally.render(total, "robot", console.width))
-    text = " ".join(console.export_text().split())
-
-    assert "robot, directed gaze: 1; 1 succeeded, 0 failed, 0 opt., 0 dropped, delay 0.90 0.90 0.90 s" in text
-
-
 def test_the_summary_names_kinds_outcomes_delays_and_pace() -> None:
     total = fed(tally.feed, tally.empty(10.0))
     total = tally.feed(total, FragmentOutcome(id="r", fragment="f", status="failed"), 12.5)

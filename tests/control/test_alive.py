@@ -14,9 +14,8 @@ from engage_hri.schemas.behaviors import FaceLexeme, FaceShift, Gaze, Pointing, 
 from engage_hri.schemas.body import BodyPose, JointAngle, RobotState
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.contract.body import BodyState, Reached
-from engage_hri.services.control.contract.extras import GIVES_WAY
 from engage_hri.services.control.figure import kinematics
-from engage_hri.services.control.figure.alive import CLOSED, CLOSING, OPENING, Blinks, closure
+from engage_hri.services.control.figure.alive import CLOSED, CLOSING, GIVES_WAY, OPENING, Blinks, closure
 from engage_hri.services.control.testing import WORLD, Stage, performed
 from engage_hri.services.control.testing.motions import recorded, violations
 from engage_hri.services.control.testing.truth import CROWDS, crowded

@@ -19,11 +19,11 @@ from engage_hri.services.control.contract.body import (
     BodyFailed,
     BodyState,
     DriverBroken,
+    Idle,
     MovementAuthority,
     Progress,
     Reached,
 )
-from engage_hri.services.control.contract.extras import Idle
 from engage_hri.services.runtime.steps import finished
 from tests.control.test_drivers import Bare
 

@@ -11,9 +11,9 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import FaceShift, Mark, Speech
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.services.control.contract.body import MouthShape
+from engage_hri.services.control.figure.alive import CHANGE, Mouth
 from engage_hri.services.control.testing import WORLD, Stage, performed
 from engage_hri.services.control.torso.body import SimulatedBody
-from engage_hri.services.control.torso.mouth import CHANGE, Mouth
 from engage_hri.services.control.voice.lips import spelled
 from engage_hri.services.control.voice.timeline import utter
 from tests.control.test_alive import TEXT, sampled, shown

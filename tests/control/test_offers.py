@@ -13,7 +13,7 @@ from engage_hri.services.control.bases import drivers
 from engage_hri.services.control.bases.driver_guard import GuardedBody
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.torso.body import SimulatedBody
-from engage_hri.services.runtime.offers import BODIES, VOICES, offers
+from engage_hri.services.runtime.installation import BODIES, VOICES, offers
 
 DRIVER = """
 from tests.control.test_drivers import Bare

@@ -9,8 +9,8 @@ import pytest
 from engage_hri.schemas.behaviors import Gaze, GazeShift
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.bus.sight import LATE
-from engage_hri.services.control.contract.body import Body, BodyFailed, Reached, TakenOver
+from engage_hri.services.bus.deadlines import LATE
+from engage_hri.services.control.contract.body import Body, BodyFailed, MovementAuthority, Reached, TakenOver
 from engage_hri.services.control.testing import WORLD, BodyContract, Stage
 from tests.control.test_docs import driver
 from tests.standing_still import stand_still
@@ -197,3 +197,19 @@ async def test_motors_that_moved_while_the_process_stood_still_are_not_stuck(
         else:
             await stage.over()
             assert stage.passed[-1] == "end"
+
+
+async def test_a_shift_beneath_a_look_ends_at_the_instant_asked_for() -> None:
+    body, loop = driver().PanTilt(), asyncio.get_running_loop()
+    async with body.connected():
+        body.see(WORLD)
+        look = Stage(body, Gaze(id="g", target="human"), "stroke")
+        await asyncio.sleep(1.5)
+        shift, asked = GazeShift(id="s", target="near-right"), loop.time() + 2.0
+        passed = [each async for each in body.perform(shift, MovementAuthority(shift, "end", {"end": asked}))]
+        look.authority.revoke()
+        await look.over()
+
+    assert [(each.sync, each.at) for each in passed if isinstance(each, Reached)] == [
+        ("start", pytest.approx(asked - 2.0)), ("end", pytest.approx(asked)),
+    ]  # fmt: skip

@@ -12,10 +12,10 @@ from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Gesture, Pointing,
 from engage_hri.schemas.body import EstimateItem, PlannedTime
 from engage_hri.services.control.figure import choreography, kinematics
 from engage_hri.services.control.figure.repertoire import BUILT_IN, extended
+from engage_hri.services.control.figure.table_clearance import ClearOfTable
 from engage_hri.services.control.motion.path import Path
 from engage_hri.services.control.testing import WORLD, Stage, performed
 from engage_hri.services.control.torso.body import SimulatedBody
-from engage_hri.services.control.torso.table_clearance import ClearOfTable
 from engage_hri.services.runtime.steps import SLICE
 
 DEEP = "[pose]\nDEEP = { torso = { lean = 25 } }\n"

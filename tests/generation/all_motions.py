@@ -14,6 +14,7 @@ from engage_hri.services.generation.references.motions import (
     HERE_AND_NOW,
     ExpectedPose,
     Motions,
+    Way,
     arm_of,
     hand_of,
 )
@@ -59,21 +60,21 @@ def from_each_other(
     first = _from_here(sequence, answers, glance)
     items = []
     for since, target, one_arm in _steps(sequence, first):
-        pose = first.gaze(CURRENT_POSE, since).pose_after
+        pose = first.known["head", CURRENT_POSE, since].pose_after
         items.append(EstimateItem(behavior=_gaze(target), pose=pose))
         if one_arm:
             # The block will name this hand: no other may be asked about, whichever is nearer from there.
-            named = hand_of(first.point(CURRENT_POSE, target)) or hand
+            named = hand_of(first.known["arm", CURRENT_POSE, target]) or hand
             pointing = Pointing(id=f"point at {target}", target=target, mode=named)
-            items.append(EstimateItem(behavior=pointing, pose=first.point(CURRENT_POSE, since).pose_after))
+            items.append(EstimateItem(behavior=pointing, pose=first.known["arm", CURRENT_POSE, since].pose_after))
     for target in distinct(sequence[1:]):
-        gaze, point = first.gaze(CURRENT_POSE, target), first.point(CURRENT_POSE, target)
+        gaze, point = first.known["head", CURRENT_POSE, target], first.known["arm", CURRENT_POSE, target]
         items.append(EstimateItem(behavior=_gaze(target), pose=gaze.pose_end))
         if point.feasible:
             pointing = Pointing(id=f"point at {target}", target=target, mode=hand_of(point) or hand)
             items.append(EstimateItem(behavior=pointing, pose=point.pose_end))
     for target in _after_glances(sequence, first):
-        items.append(EstimateItem(behavior=_gaze(target), pose=first.gaze(CURRENT_POSE, glance).pose_after))
+        items.append(EstimateItem(behavior=_gaze(target), pose=first.known["head", CURRENT_POSE, glance].pose_after))
     return tuple(items)
 
 
@@ -84,15 +85,15 @@ def collect(
     motions = _from_here(sequence, here, glance)
     answers = iter(onward)
     for since, target, one_arm in _steps(sequence, motions):
-        motions.gazes[since, target] = next(answers)
+        motions.known[Way("head", since, target)] = next(answers)
         if one_arm:
-            motions.points[since, target] = next(answers)
+            motions.known[Way("arm", since, target)] = next(answers)
     for target in distinct(sequence[1:]):
-        motions.gazes[AT_REST, target] = next(answers)
-        here_too = motions.point(CURRENT_POSE, target)
-        motions.points[AT_REST, target] = next(answers) if here_too.feasible else here_too
+        motions.known[Way("head", AT_REST, target)] = next(answers)
+        here_too = motions.known["arm", CURRENT_POSE, target]
+        motions.known[Way("arm", AT_REST, target)] = next(answers) if here_too.feasible else here_too
     for target in _after_glances(sequence, motions):
-        motions.gazes[glance, target] = next(answers)
+        motions.known[Way("head", glance, target)] = next(answers)
     return motions
 
 
@@ -110,15 +111,14 @@ def _after_glances(sequence: Sequence[str], motions: Motions) -> tuple[str, ...]
 
 
 def _from_here(sequence: Sequence[str], answers: Sequence[Estimate], glance: str = "") -> Motions:
-    gazes: dict[tuple[str, str], Estimate] = {}
-    points: dict[tuple[str, str], Estimate] = {}
+    known: dict[Way, Estimate] = {}
     each = answers[:-1] if glance else answers
     for target, gaze, point in zip(distinct(sequence), each[::2], each[1::2], strict=True):
-        gazes[CURRENT_POSE, target], points[CURRENT_POSE, target] = gaze, point
+        known[Way("head", CURRENT_POSE, target)], known[Way("arm", CURRENT_POSE, target)] = gaze, point
     if glance and answers[-1].feasible:
-        gazes[CURRENT_POSE, glance] = answers[-1]
-        return Motions(gazes, points, glance)
-    return Motions(gazes, points)
+        known[Way("head", CURRENT_POSE, glance)] = answers[-1]
+        return Motions(known, glance)
+    return Motions(known)
 
 
 def _steps(sequence: Sequence[str], motions: Motions) -> Iterator[tuple[str, str, bool]]:
@@ -129,10 +129,10 @@ def _steps(sequence: Sequence[str], motions: Motions) -> Iterator[tuple[str, str
     next_to_each_other = set(pairwise(sequence))
     seen: set[tuple[str, str]] = set()
     for index, target in enumerate(sequence):
-        there = motions.point(CURRENT_POSE, target)
+        there = motions.known["arm", CURRENT_POSE, target]
         for since in sequence[index - 1 : index] if motions.glance and index else sequence[:index]:
             if (since, target) not in seen:
                 seen.add((since, target))
-                before = motions.point(CURRENT_POSE, since)
+                before = motions.known["arm", CURRENT_POSE, since]
                 one_arm = before.feasible and there.feasible and arm_of(before) == arm_of(there)
                 yield since, target, one_arm and (since, target) in next_to_each_other

@@ -16,7 +16,7 @@ from engage_hri.schemas.check import check
 from engage_hri.schemas.fragments import GestureChoice, ReferenceChoice, TurnFragment
 from engage_hri.services.generation.block.emission import Emission, FragmentPlan
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.inhibitions import Permits
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.policy import plan_turn
 

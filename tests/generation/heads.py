@@ -10,7 +10,7 @@ from engage_hri.schemas.units import Seconds, Stamp, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.head.arbiter import Arbiter, Ruling
-from engage_hri.services.generation.head.inhibitions import Inhibition
+from engage_hri.services.generation.inhibitions import Inhibition
 
 AT = Stamp("test", 0.0)
 

@@ -18,9 +18,8 @@ from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.references.distractors import in_zone
 from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE, Motions, arm_of, hand_of
-from engage_hri.services.generation.references.pairs import ReferenceScene
+from engage_hri.services.generation.references.pairs import ReferenceScene, channel_reliability, reliability
 from engage_hri.services.generation.references.policy import Choices, Unreferable
-from engage_hri.services.generation.references.reliability import channel_reliability, reliability
 from engage_hri.services.generation.references.sequence import EXPECTED_DELAY
 from tests.generation.tables import in_gaze_cone, in_pointing_cylinder
 
@@ -72,7 +71,7 @@ class HeadAndArms(Struct, frozen=True):
         arms = dict(self.home_again(motions).arms)
         if gesture != "directed_gaze_with_pointing":
             return HeadAndArms(target, tuple(arms.items()))
-        arms[arm_of(motions.point(CURRENT_POSE, target))] = target
+        arms[arm_of(motions.known["arm", CURRENT_POSE, target])] = target
         return HeadAndArms(motions.glance or target, tuple(sorted(arms.items())))
 
     def home_again(self, motions: Motions) -> "HeadAndArms":
@@ -136,7 +135,7 @@ def choose(
                 "which (a higher certainty, or minimum reliability, asks for a point, if one is possible)"
             )
         if choice.gesture == "directed_gaze_with_pointing" and (
-            hand := hand_of(motions.point(CURRENT_POSE, choice.target))
+            hand := hand_of(motions.known["arm", CURRENT_POSE, choice.target])
         ):
             hands[choice.reference] = hand
     return Choices(choices, tuple(warnings), hands)
@@ -155,7 +154,7 @@ def considered(
     """The table of a reference: every pair of gesture and phrase (J x S) with its distractors and reliability."""
     target = reference.target
     universe = scene.universe - {target}
-    gaze, point = motions.gaze(CURRENT_POSE, target), motions.point(CURRENT_POSE, target)
+    gaze, point = motions.known["head", CURRENT_POSE, target], motions.known["arm", CURRENT_POSE, target]
     gazed, pointed = universe, universe
     if gaze.ray is not None:
         gazed = in_gaze_cone(gaze.ray, scene.half_angle, scene.layout) - {target}
@@ -195,12 +194,12 @@ def cost(pair: Pair, target: str, posture: HeadAndArms, motions: Motions, config
     """Cost C(j, s) in seconds, from `posture`: head, wait for shared gaze (decision B7), arm, words."""
     seconds = _speaking(pair, config)
     if pair.gesture != "none":
-        seconds += config.head_cost(motions.gaze(posture.head, target).head_degrees)
+        seconds += config.seconds_per_head_degree * motions.known["head", posture.head, target].head_degrees
     if pair.gesture in ("directed_gaze", "directed_gaze_with_pointing"):
         seconds += config.wait_weight * EXPECTED_DELAY
     if pair.gesture == "directed_gaze_with_pointing":
-        arm = arm_of(motions.point(CURRENT_POSE, target))
-        seconds += config.arm_cost(motions.point(posture.arm(arm), target).arm_degrees)
+        arm = arm_of(motions.known["arm", CURRENT_POSE, target])
+        seconds += config.seconds_per_arm_degree * motions.known["arm", posture.arm(arm), target].arm_degrees
     return seconds
 
 
@@ -210,7 +209,7 @@ def _speaking(pair: Pair, config: GenerationConfig) -> Seconds:
 
 def _obstacles(target: str, scene: ReferenceScene, motions: Motions) -> tuple[str, str]:
     """Reasons why the robot cannot look, and cannot point, at `target`; each empty if it can (decision B9)."""
-    gaze, point = motions.gaze(CURRENT_POSE, target), motions.point(CURRENT_POSE, target)
+    gaze, point = motions.known["head", CURRENT_POSE, target], motions.known["arm", CURRENT_POSE, target]
     no_gaze = scene.no_gaze or _refusal("look", gaze)
     no_point = scene.no_point or _refusal("point", point)
     entity = scene.world.entity(target)
@@ -223,11 +222,11 @@ def _hindrance(gesture: GestureChoice, target: str, posture: HeadAndArms, motion
     """Reason why the body cannot make `gesture` from `posture`; empty if it can."""
     if gesture == "none":
         return ""
-    no_gaze = _refusal("look from there", motions.gaze(posture.head, target))
+    no_gaze = _refusal("look from there", motions.known["head", posture.head, target])
     if no_gaze or gesture != "directed_gaze_with_pointing":
         return no_gaze
-    arm = arm_of(motions.point(CURRENT_POSE, target))
-    return _refusal("point from there", motions.point(posture.arm(arm), target))
+    arm = arm_of(motions.known["arm", CURRENT_POSE, target])
+    return _refusal("point from there", motions.known["arm", posture.arm(arm), target])
 
 
 def _refusal(verb: str, motion: Estimate) -> str:

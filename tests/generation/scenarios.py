@@ -23,7 +23,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.inhibitions import Permits
 
 COLORS, SHAPES = ("red", "green", "blue"), ("square", "triangle", "cup")
 PIECE = ((0.02, 0.02), (-0.02, 0.02), (-0.02, -0.02), (0.02, -0.02))

@@ -15,7 +15,7 @@ from engage_hri.services.generation.references.distractors import (
     in_gaze_cones,
     in_pointing_cylinders,
 )
-from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE, Motions
+from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE, Motions, Way
 from engage_hri.services.generation.references.pairs import ReferenceScene
 
 TANGRAMS = (
@@ -70,8 +70,7 @@ def body(
     refused: Sequence[tuple[str, str]] = (),
 ) -> Motions:
     """Degrees by (since, target). refused: (since, target) of points that the body cannot make from there."""
-    gazes: dict[tuple[str, str], Estimate] = {}
-    points: dict[tuple[str, str], Estimate] = {}
+    known: dict[Way, Estimate] = {}
     for target in sequence:
         entity = world.entity(target)
         assert entity is not None
@@ -79,9 +78,10 @@ def body(
         above: Vector = (x, y, HEIGHT)
         for since in (CURRENT_POSE, AT_REST, *sequence):
             ray = Ray(origin=above, axis=(0.0, 0.0, -1.0), tip=above)
-            gazes[since, target] = Estimate(behavior="g", feasible=True, head_degrees=head(since, target), ray=ray)
+            look = Estimate(behavior="g", feasible=True, head_degrees=head(since, target), ray=ray)
+            known[Way("head", since, target)] = look
             reached = target not in out_of_reach and (since, target) not in refused
-            points[since, target] = Estimate(
+            known[Way("arm", since, target)] = Estimate(
                 behavior="p",
                 feasible=reached,
                 fault=None if reached else Fault(reason="out of reach"),
@@ -89,7 +89,7 @@ def body(
                 parts=(arm_for(target),) if reached else (),
                 ray=ray if reached else None,
             )
-    return Motions(gazes, points)
+    return Motions(known)
 
 
 def option(

@@ -14,8 +14,7 @@ from engage_hri.services.generation.references.motions import (
     onward_told,
 )
 from engage_hri.services.generation.references.pairs import POINT, Table, considered, shown
-from engage_hri.services.generation.references.posture import HeadAndArms
-from engage_hri.services.generation.references.sequence import unasked
+from engage_hri.services.generation.references.sequence import HeadAndArms, unasked
 from tests.generation.tables import apart, body, option, refer, scene
 
 CONFIG = GenerationConfig()
@@ -23,9 +22,8 @@ CONFIG = GenerationConfig()
 
 def asked_for(references: list[Reference], motions: Motions, *apart_ids: str) -> list[tuple[str, str, str]]:
     """Ways that are asked for at first: a look from here, a point from here, each known."""
-    here = {way: motion for way, motion in motions.gazes.items() if way[0] == CURRENT_POSE}
-    points = {way: motion for way, motion in motions.points.items() if way[0] == CURRENT_POSE}
-    known = Motions(here, points, motions.glance)
+    here = {way: motion for way, motion in motions.known.items() if way[1] == CURRENT_POSE}
+    known = Motions(here, motions.glance)
     world = apart()
     seems = shown([reference.target for reference in references], scene(world), known)
     tables = [
@@ -72,7 +70,7 @@ def test_from_there_the_body_is_asked_about_the_hand_that_will_be_named_and_for_
     sides = {"trapezoid": "right_arm", "rectangle": "left_arm"}
     motions = body(apart(), list(sides), arm_for=sides.get)  # type: ignore[arg-type]
     ways = [Way("head", "trapezoid", "rectangle"), Way("arm", AT_REST, "rectangle"), Way("arm", "x", "trapezoid")]
-    motions.points[CURRENT_POSE, "x"] = motions.point(CURRENT_POSE, "trapezoid")
+    motions.known["arm", CURRENT_POSE, "x"] = motions.known["arm", CURRENT_POSE, "trapezoid"]
 
     asked = onward(ways, motions)
 
@@ -95,15 +93,15 @@ def test_a_motion_starts_where_the_one_before_it_ends() -> None:
 
     assert [item.pose for item in onward(ways, motions)] == [after, end, after, end]
     told = onward_told(ways, motions, here)
-    assert (told.gaze("a", "b"), told.gaze(AT_REST, "b")) == (here[0], here[1])
-    assert (told.point("a", "b"), told.point(AT_REST, "b")) == (here[2], here[3])
-    assert not motions.has(ways[0])
+    assert (told.known["head", "a", "b"], told.known["head", AT_REST, "b"]) == (here[0], here[1])
+    assert (told.known["arm", "a", "b"], told.known["arm", AT_REST, "b"]) == (here[2], here[3])
+    assert ways[0] not in motions.known
 
 
 def test_the_head_is_on_who_is_glanced_at_after_a_point() -> None:
     away = Estimate(behavior="", feasible=True, head_degrees=40.0)
     motions = body(apart(), ["rectangle", "rectangle"])
-    motions = Motions({**motions.gazes, ("ann", "rectangle"): away}, motions.points, "ann")
+    motions = Motions({**motions.known, Way("head", "ann", "rectangle"): away}, "ann")
     posture = HeadAndArms().afterwards("rectangle", "right_arm", motions)[POINT]
 
     assert posture.head == "ann"
@@ -119,7 +117,7 @@ def test_a_glance_is_asked_about_once_and_only_for_what_comes_after_it() -> None
     targets = ["rectangle", "rectangle", "trapezoid", "trapezoid", "ann"]
     assert [item.behavior.target for item in first] == targets  # type: ignore[union-attr]
     assert ("head", "ann", "trapezoid") in asked_for(references, motions)
-    assert motions.gaze(CURRENT_POSE, "ann") is here[4]
+    assert motions.known["head", CURRENT_POSE, "ann"] is here[4]
 
 
 def test_who_cannot_be_looked_at_is_not_glanced_at() -> None:

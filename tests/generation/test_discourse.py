@@ -12,7 +12,7 @@ from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.talk.offline_plan import generated
-from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
+from engage_hri.services.generation.references.phrases import NO_DISCOURSE, Discourse
 from engage_hri.services.simulation.still import table_world
 from tests.generation.partners import Partners, stage
 

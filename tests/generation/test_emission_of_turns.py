@@ -15,7 +15,7 @@ from engage_hri.schemas.behaviors import (
     TurnSignal,
 )
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.inhibitions import Permits
 from tests.generation.emitted import LOOK, POINT, Made, block, by_id, emission, lines, reference, speech, start_of
 
 # -- the turn ----------------------------------------------------------------------------------------------------

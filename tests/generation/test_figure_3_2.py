@@ -8,7 +8,7 @@ from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.services.generation.block.emission import FragmentPlan
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.fragment_check import checked
-from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.inhibitions import Permits
 from engage_hri.services.generation.pipeline import targets
 from engage_hri.services.generation.turns.policy import plan_turn
 from tests.generation.emitted import POINT, by_id, lines

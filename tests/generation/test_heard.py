@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.generation.turns.heard import LOOKS_BACK, HeardWords
+from engage_hri.services.generation.turns.outcomes import LOOKS_BACK, HeardWords
 
 
 def at(seconds: float) -> Stamp:

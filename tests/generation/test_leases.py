@@ -6,8 +6,7 @@ from engage_hri.schemas.behaviors import Gaze, Gesture, Pointing, Speech
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import Claim, Inhibit
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.head.inhibitions import Inhibition, Leases
-from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.inhibitions import Inhibition, Leases, Permits
 
 
 def lease(id: str = "l", **fields: object) -> Inhibit:

@@ -16,8 +16,7 @@ from engage_hri.schemas.behaviors import (
     Wait,
 )
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.services.generation.fragment_check import checked
-from engage_hri.services.generation.lost import bearable
+from engage_hri.services.generation.fragment_check import bearable, checked
 from engage_hri.services.simulation.still import table_world
 
 WORLD = table_world()

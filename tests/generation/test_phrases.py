@@ -11,7 +11,7 @@ from engage_hri.schemas.behaviors import Reference, SpeechOption
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.inhibitions import Permits
 from engage_hri.services.generation.references import phrases
 from engage_hri.services.generation.references.phrases import Proposals, proposed
 from engage_hri.services.generation.turns.policy import plan_turn

@@ -12,7 +12,7 @@ from engage_hri.schemas.body import EstimateBehaviors
 from engage_hri.schemas.fragments import FragmentOutcome, Inhibit, TurnFragment
 from engage_hri.schemas.messages import Message
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.generation import body_link
+from engage_hri.services.generation import pipeline
 from tests.generation import partners as partners_module
 from tests.generation.partners import TABLE, Partners, stage
 
@@ -31,7 +31,7 @@ def refers(*targets: str) -> TurnFragment:
 
 @pytest.fixture(autouse=True)
 def a_pause_at_each_step(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(body_link, "SLICE", 1)
+    monkeypatch.setattr(pipeline, "SLICE", 1)
 
 
 class Interruption:

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas.fragments import GestureChoice
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.references.reliability import channel_reliability, reliability
+from engage_hri.services.generation.references.pairs import channel_reliability, reliability
 
 
 @pytest.mark.parametrize(

@@ -33,7 +33,6 @@ from engage_hri.services.generation.pipeline import (
     targets,
 )
 from engage_hri.services.generation.references.motions import (
-    NotAsked,
     distinct,
     from_here,
     from_here_told,
@@ -42,7 +41,7 @@ from engage_hri.services.generation.references.motions import (
 )
 from engage_hri.services.generation.references.phrases import proposed
 from engage_hri.services.generation.references.policy import Choices, Unreferable
-from engage_hri.services.generation.references.posture import references_apart
+from engage_hri.services.generation.references.sequence import references_apart
 from engage_hri.services.generation.turns.policy import in_vain, plan_turn
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.generation.all_motions import all_motions
@@ -93,7 +92,7 @@ def outcome(way: Way, *arguments: Any) -> Outcome:
         return str(error.fault), tuple(map(rounded, error.choices))
     except RunFailed as error:
         return str(error.fault), ()
-    except NotAsked:
+    except KeyError:
         return LOST
     return replace(made, choices=tuple(map(rounded, made.choices)))
 
@@ -192,7 +191,7 @@ def exactly(way: Way, it: Scenario, body: Capabilities, ask: Ask) -> object:
         return way(it, body, ask)
     except RunFailed as error:
         return str(error.fault), getattr(error, "choices", ())
-    except NotAsked:
+    except KeyError:
         return LOST
 
 

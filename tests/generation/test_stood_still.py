@@ -9,8 +9,8 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
 from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.recognition import session_of
+from engage_hri.services.bus.deadlines import LATE, Sight
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.bus.sight import LATE, Sight
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.turns import policy
 from engage_hri.services.generation.turns.policy import TurnPolicy

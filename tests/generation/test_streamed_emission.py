@@ -16,7 +16,7 @@ from engage_hri.schemas.behaviors import (
     Timing,
 )
 from engage_hri.schemas.fragments import TurnFragment
-from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.inhibitions import Permits
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation, Stroke
 from tests.generation.emitted import LOOK, POINT, by_id, emission, lines, reference, speech, start_of
 

@@ -4,7 +4,7 @@ import pytest
 
 from engage_hri.schemas.recognition import ConnectionEvent, EventState
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.generation.turns.events import TurnEvents
+from engage_hri.services.generation.turns.outcomes import TurnEvents
 
 
 def event(id: str, state: EventState, at: float = 0.0) -> ConnectionEvent:

@@ -20,6 +20,7 @@ from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, Utterance
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.bus.deadlines import FORGOTTEN_AFTER
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.people.perceive import perceive
@@ -31,7 +32,6 @@ from engage_hri.services.console.web.frames import Receipts, Viewer
 from engage_hri.services.console.web.orders import Script
 from engage_hri.services.console.web.service import WindowServer, window
 from engage_hri.services.console.web.visitor import Visitor
-from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
 from engage_hri.services.runtime.service import running
 from tests.recording.runs import recording_to
 

@@ -8,19 +8,19 @@ import asyncio
 from pathlib import Path
 
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.deadlines import SLACK
 from engage_hri.services.bus.subscription import KEYS_KEPT
 from engage_hri.services.client.robot import UTTERANCES_KEPT
 from engage_hri.services.console.view import EVENTS_KEPT, WARNINGS_KEPT
 from engage_hri.services.console.view import UTTERANCES_KEPT as UTTERANCES_SHOWN
-from engage_hri.services.generation.turns.heard import MOST as WORDS_KEPT
-from engage_hri.services.generation.turns.heard import PEOPLE
+from engage_hri.services.generation.turns.outcomes import MOST as WORDS_KEPT
+from engage_hri.services.generation.turns.outcomes import PEOPLE
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT
 from engage_hri.services.recognition.events.machine import TEXTS_KEPT
 from engage_hri.services.recognition.events.session import ACTIONS_KEPT, TURNS_KEPT
 from engage_hri.services.recognition.perceive.clock_errors import PEOPLE_KEPT
 from engage_hri.services.recording.disk import FULL_CHUNK
 from engage_hri.services.recording.writing import MOST_CHANNELS
-from engage_hri.services.requests.deadlines import SLACK
 from engage_hri.services.requests.serving import KEPT as NAMES_KEPT
 from tests.growth.lives import CALM, life
 from tests.growth.reach import Growth, grown, modules, running, sizes

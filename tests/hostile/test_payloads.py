@@ -11,7 +11,7 @@ from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.messages import Message, encode
 from engage_hri.schemas.requests import Cancel
-from engage_hri.services.bus.payloads import read_payload
+from engage_hri.services.bus.samples import read_payload
 from tests.rigs.hostile.markup import document
 from tests.rigs.hostile.payloads import Payloads
 from tests.rigs.hostile.typed import KINDS, RandomMessages, Words, distorted

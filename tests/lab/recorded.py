@@ -17,7 +17,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.requests import Accepted, Outcome, Refused
 from engage_hri.services.bus.zenoh.hub import ZenohHub
-from engage_hri.services.bus.zenoh.links import Router, RouterNews
+from engage_hri.services.bus.zenoh.links import RouterNews
 from engage_hri.services.bus.zenoh.peers import Peers
 from engage_hri.services.requests.ends import Pending, Requester
 
@@ -107,15 +107,14 @@ def tap(record: Record) -> None:
         note(peers, part, name, run, there)
         record("sees" if name in peers.names else "misses", name=name)
 
-    def coming(news: RouterNews, router: Router, now: float) -> str | None:
+    def coming(news: RouterNews, zid: str, endpoint: str, now: float) -> str | None:
         record("linked")
-        return came(news, router, now)
+        return came(news, zid, endpoint, now)
 
-    def going(news: RouterNews, zid: str, now: float) -> str | None:
-        line = went(news, zid, now)
+    def going(news: RouterNews, zid: str, now: float) -> None:
+        went(news, zid, now)
         if not news._here:
             record("unlinked")
-        return line
 
     RouterNews.came, RouterNews.went = coming, going  # type: ignore[method-assign]
     ZenohHub.publish = publishing  # type: ignore[method-assign]

@@ -31,10 +31,10 @@ class Player:
 
     def play(self) -> float:
         """To the end; returns how long it took."""
-        while not self.decisions.is_over:
+        while not self.decisions.net.is_over:
             while self._decide():
                 pass
-            if self.decisions.is_over:
+            if self.decisions.net.is_over:
                 break
             deadline = self.decisions.deadline
             if self._coming and (deadline is None or self._coming[0][0] <= deadline):

@@ -7,8 +7,8 @@ from lxml import etree
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.realizer.export import PT_NET, TOOL, VERSION, of_ours, of_pnml
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place, PlaceKind, Transition
-from engage_hri.services.realizer.net.pnml import PT_NET, TOOL, VERSION, of_ours, of_pnml
 from engage_hri.services.realizer.points import Point
 
 

@@ -7,7 +7,7 @@ import pytest
 from engage_hri.schemas.behaviors import Gesture, Pointing, Wait
 from engage_hri.schemas.blocks import Block, BlockOutcome
 from engage_hri.schemas.body import BehaviorOutcome
-from engage_hri.services.realizer.report.outcome import Spoken
+from engage_hri.services.realizer.report import Spoken
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import stage
 

@@ -3,7 +3,7 @@
 from engage_hri.schemas.behaviors import Head, Pointing, Speech
 from engage_hri.schemas.blocks import BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from engage_hri.services.realizer.points import Point
-from engage_hri.services.realizer.report.feedback import MOVED, moved_noticeably
+from engage_hri.services.realizer.report import MOVED, moved_noticeably
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import block, stage, together
 

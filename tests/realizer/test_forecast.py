@@ -49,7 +49,7 @@ def test_the_forecast_that_is_kept_is_the_one_from_scratch(
         authority.foresight.catch_up()
         kept.update()
         facts, net, experience = authority.facts, authority.net, authority.foresight.experience
-        scratch = full_forecast(plan, facts.began, experience.factor, {}, facts.reached, facts.arrived, net.instants)
+        scratch = full_forecast(plan, facts.began, experience.factor, {}, facts.reached, facts.arrived, net.fired)
         scratch.update()
         size = len(plan.members)
         assert kept.times[:size] == pytest.approx(scratch.times[:size], abs=1e-5)

@@ -11,7 +11,7 @@ from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.decisions import Decisions
 from engage_hri.services.realizer.decide.lateness import STANDING, HeldUp
 from engage_hri.services.realizer.foresee.expectations import Outlook
-from engage_hri.services.realizer.net.clocks import Stops
+from engage_hri.services.realizer.net.facts import Stops
 from engage_hri.services.realizer.points import ORIGIN, Point
 from tests.realizer.planning import elastic, plan, timed
 from tests.realizer.stage import block, together

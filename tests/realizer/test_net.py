@@ -12,15 +12,12 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import Event, Gaze, Pointing, Speech, Timing
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.services.realizer.export import as_dot, as_json, as_pnml, as_text
-from engage_hri.services.realizer.net import pnml
+from engage_hri.services.realizer.export import as_dot, as_json, as_pnml, as_text, net_as_pnml
 from engage_hri.services.realizer.net.petri_net import (
     Bound,
     PetriNet,
     Place,
     Transition,
-    enabled,
-    fire,
     fire_once_each,
     is_live,
     is_safe,
@@ -29,6 +26,7 @@ from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody
+from tests.realizer.firing import enabled, fire
 from tests.realizer.oracle import estimated, random_blocks
 from tests.realizer.pnml_reader import read_pnml
 from tests.realizer.stage import after, before, block, together
@@ -170,7 +168,7 @@ def test_pnml_keeps_seconds_lines_bounds_and_strange_names() -> None:
         (Bound("phase", 1, 0, -1 / 3, None, "é-1"), Bound("order", 1, 0, -2.0, 0.0, "", (7,))),
     )
 
-    assert read_pnml(pnml.as_pnml(net, "ü")) == net
+    assert read_pnml(net_as_pnml(net, "ü")) == net
 
 
 FOREIGN = """<pnml xmlns="http://www.pnml.org/version-2009/grammar/pnml">

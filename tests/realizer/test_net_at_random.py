@@ -9,15 +9,12 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Gaze, Pointing, Speech, Wait
-from engage_hri.services.realizer.export import as_dot, as_json, as_message, as_text
-from engage_hri.services.realizer.net import pnml
+from engage_hri.services.realizer.export import as_dot, as_json, as_message, as_text, net_as_pnml
 from engage_hri.services.realizer.net.petri_net import (
     Bound,
     PetriNet,
     Place,
     Transition,
-    enabled,
-    fire,
     fire_once_each,
     is_live,
     is_safe,
@@ -25,6 +22,7 @@ from engage_hri.services.realizer.net.petri_net import (
 )
 from engage_hri.services.realizer.points import Point
 from tests.random_cases import share_of
+from tests.realizer.firing import enabled, fire
 from tests.realizer.planning import at, plan, timed
 from tests.realizer.pnml_reader import read_pnml
 from tests.realizer.stage import after, before, block, together
@@ -137,7 +135,7 @@ def any_nets(draw: st.DrawFn) -> PetriNet:
 @settings(max_examples=share_of(100), deadline=None)
 @given(any_nets(), NAMES)
 def test_any_net_comes_back_from_pnml_equal(net: PetriNet, name: str) -> None:
-    document = pnml.as_pnml(net, name)
+    document = net_as_pnml(net, name)
 
     assert read_pnml(document) == net == read_pnml(document.encode())
     assert document.count("initialMarking") == 2 * sum(place.kind == "idle" for place in net.places)
@@ -146,7 +144,7 @@ def test_any_net_comes_back_from_pnml_equal(net: PetriNet, name: str) -> None:
 def test_what_another_version_or_tool_has_added_is_passed_over() -> None:
     net = PetriNet((Transition("x", ()), Transition("y", ())), (Place("order", 0, 1, 2.0, 2.0), Place("idle", 1, 0)))
     plain = replace(net, places=(Place("order", 0, 1), Place("idle", 1, 0)))
-    document = pnml.as_pnml(net)
+    document = net_as_pnml(net)
 
     assert read_pnml(document) == net
     for old, new in (('tool="engage" version="1"', 'tool="engage" version="2"'), ('tool="engage"', 'tool="other"')):

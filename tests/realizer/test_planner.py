@@ -24,12 +24,13 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
 from engage_hri.services.realizer.export import as_dot, as_json, as_text
-from engage_hri.services.realizer.net.petri_net import enabled, fire, is_live
+from engage_hri.services.realizer.net.petri_net import is_live
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody, natural_durations, points_of
+from tests.realizer.firing import enabled, fire
 from tests.realizer.stage import after, before, block, together
 
 GAZE = Gaze(id="g", target="can")

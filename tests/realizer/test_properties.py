@@ -28,7 +28,7 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.blocks import Block, BlockOutcome
 from engage_hri.schemas.references import SyncRef
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.net.petri_net import enabled, fire, is_live
+from engage_hri.services.realizer.net.petri_net import is_live
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.plan.relations import BlockRefused
@@ -37,6 +37,7 @@ from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.random_cases import share_of
 from tests.realizer.fake_body import HOLDS, FakeBody, Script, natural_durations, type_of
+from tests.realizer.firing import enabled, fire
 from tests.realizer.stage import stage
 
 OFFSETS = (-1.0, 0.0, 0.0, 0.0, 0.5, 2.0)

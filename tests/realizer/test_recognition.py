@@ -6,8 +6,8 @@ import pytest
 
 from engage_hri.schemas.behaviors import Event, Speech, TurnSignal
 from engage_hri.schemas.recognition import EventOutcome, RequestEvent
+from engage_hri.services.bus.deadlines import LATE
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.bus.sight import LATE
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.service import running
 from tests.realizer.fake_body import FakeBody, Script

@@ -13,12 +13,11 @@ from engage_hri.schemas.body import BehaviorOutcome, Estimate
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.realizer.foresee.pace import Experience
-from engage_hri.services.realizer.net.clocks import Clocks
-from engage_hri.services.realizer.net.running import RunningNet
+from engage_hri.services.realizer.net.running import Clocks, RunningNet
 from engage_hri.services.realizer.perform.behavior_run import SyncPointFutures, has_lost_nothing, loss
 from engage_hri.services.realizer.plan.remaining import kind_of
 from engage_hri.services.realizer.points import FINISH, Point
-from engage_hri.services.realizer.report.outcome import Spoken, completed
+from engage_hri.services.realizer.report import Spoken, completed
 from engage_hri.services.realizer.together.live import Ending, Live
 from engage_hri.services.realizer.together.live_blocks import Past
 from tests.random_cases import share_of

@@ -90,7 +90,7 @@ def check(decisions: Decisions, now: float) -> None:
     decisions.net.tick(now)
     reached = decisions.facts.reached
     assert decisions.net.marking == marking_by(decisions.plan, decisions.began, reached, now)
-    assert decisions.net.instants == pytest.approx(fired_by(decisions.plan, decisions.began, reached, now))
+    assert decisions.net.fired == pytest.approx(fired_by(decisions.plan, decisions.began, reached, now))
 
 
 @settings(max_examples=share_of(60), deadline=None)
@@ -108,7 +108,7 @@ def test_at_any_time_the_marking_is_the_one_that_the_reports_give(
     player.play()
     net = player.decisions.net
 
-    assert set(net.instants) >= set(range(len(plan.members))) - {
+    assert set(net.fired) >= set(range(len(plan.members))) - {
         plan.at[Point(id, "end")] for id in plan.chains.keys() - plan.waited_for
     }
     net.let_go()
@@ -220,7 +220,7 @@ def test_a_word_that_cannot_wait_goes_on_and_the_instant_fires_with_the_last() -
     decisions.reach(Point("s", "m"), 11.0)
     word = plan.at[Point("s", "m")]
 
-    assert word not in decisions.net.instants
+    assert word not in decisions.net.fired
     decisions.reach(Point("s", "end"), 11.5)
     assert not any(
         tokens and place.behavior == "s" and place.kind == "phase"
@@ -228,8 +228,8 @@ def test_a_word_that_cannot_wait_goes_on_and_the_instant_fires_with_the_last() -
     )
     decisions.reach(Point("beat", "stroke"), 12.0)
 
-    assert decisions.net.instants[word] == 12.0
-    assert decisions.net.instants[plan.at[Point("s", "end")]] == 12.0
+    assert decisions.net.fired[word] == 12.0
+    assert decisions.net.fired[plan.at[Point("s", "end")]] == 12.0
     assert decisions.net.passed[plan.at[Point("s", "end")]] == 11.5
 
 

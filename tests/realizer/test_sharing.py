@@ -10,8 +10,7 @@ from engage_hri.schemas.behaviors import FaceLexeme, Gaze, GazeShift, Gesture, H
 from engage_hri.schemas.blocks import Block, BlockOutcome, SyncPointProgress
 from engage_hri.services.realizer.plan.assembly import Assembler
 from engage_hri.services.realizer.plan.handover import Arrangement
-from engage_hri.services.realizer.plan.known import Holder, Known, holders_of, qualified
-from engage_hri.services.realizer.plan.other_blocks import needless_turns
+from engage_hri.services.realizer.plan.known import Holder, Known, holders_of, needless_turns, qualified
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.requests.ends import RequestRefused

@@ -5,7 +5,7 @@ import pytest
 from engage_hri.schemas.behaviors import Mark, Speech
 from engage_hri.schemas.blocks import SpokenText
 from engage_hri.services.realizer.points import Point
-from engage_hri.services.realizer.report.outcome import Spoken
+from engage_hri.services.realizer.report import Spoken
 
 STORY = Speech(id="s", text="one two three", marks=(Mark("m", 4),))
 

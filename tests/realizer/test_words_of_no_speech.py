@@ -3,7 +3,7 @@
 import pytest
 
 from engage_hri.schemas.behaviors import Gaze, Speech
-from engage_hri.services.realizer.report.outcome import Spoken
+from engage_hri.services.realizer.report import Spoken
 
 
 @pytest.mark.parametrize("id", ["look", "nobody"])

@@ -11,7 +11,7 @@ from engage_hri.services.recognition.events.machine import PersonForgotten
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
-from engage_hri.services.reports.action_reports import REPORT_GRACE, Reporters
+from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports
 from engage_hri.services.reports.ongoing_actions import ActionEvent, OngoingActionTracker
 from tests.recognition.observations import PIECES, ROBOT, stamp, world
 from tests.recognition.raw import EYES
@@ -30,7 +30,7 @@ class Lobby:
         self.recognizer = Recognizer(ROBOT, config)
         self.published = PublishedStatistics(ROBOT, config)
         self.book = OpenEventTracker(ROBOT, "session")
-        self.reporters = Reporters(ROBOT, REPORT_GRACE, "loop", lambda stamp: stamp.seconds)
+        self.reporters = ActionReports(ROBOT, REPORT_GRACE, "loop", lambda stamp: stamp.seconds)
         self.feed(world("host"), 0.0)
 
     def feed(self, observation: Perceived, at: Seconds) -> None:

@@ -12,6 +12,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.perception import ActionBegan, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, Statistics
 from engage_hri.schemas.requests import Accepted, Refused
+from engage_hri.services.bus.deadlines import FORGOTTEN_AFTER
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events import people
 from engage_hri.services.recognition.events.machine import PersonForgotten
@@ -19,7 +20,6 @@ from engage_hri.services.recognition.events.open_events import OpenEventTracker
 from engage_hri.services.recognition.events.person import AFTER_ROBOT_DIRECTED, DIRECT_BY_LOOK, PersonRecognition
 from engage_hri.services.recognition.events.session import Session
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
-from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
 from tests.random_cases import share_of
 from tests.recognition.kept import kinds
 from tests.recognition.observations import HUMAN, ROBOT, Log, request_event, stamp, world

@@ -4,7 +4,7 @@ from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.reports.action_reports import Reporters
+from engage_hri.services.reports.action_reports import ActionReports
 from engage_hri.services.reports.ongoing_actions import ActionEvent, GoesOn, TimedReport
 from tests.recognition.observations import ROBOT, stamp
 
@@ -41,7 +41,7 @@ class World:
 
     def __init__(self, *says: ActionEvent | OngoingActions) -> None:
         """says: what "cameras" have said, each at its own time."""
-        self.reporters = Reporters(ROBOT, GRACE, "loop", lambda stamp: stamp.seconds)
+        self.reporters = ActionReports(ROBOT, GRACE, "loop", lambda stamp: stamp.seconds)
         self.presence(alive(), 0.0)
         for one in says:
             self.hears(one)

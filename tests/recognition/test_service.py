@@ -12,9 +12,9 @@ from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, Statistics
 from engage_hri.schemas.units import Stamp
+from engage_hri.services.bus.deadlines import LATE
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryBus, MemoryHub
-from engage_hri.services.bus.sight import LATE
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.service import recognize
 from engage_hri.services.reports.action_reports import REPORT_GRACE

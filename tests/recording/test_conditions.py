@@ -16,8 +16,7 @@ from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Bus, Sample
 from engage_hri.services.client.robot import Robot
 from engage_hri.services.commandline.shell.config import Config
-from engage_hri.services.commandline.study.recorded_sessions import sessions
-from engage_hri.services.recording.conditions import Stretch, stretches
+from engage_hri.services.commandline.study.recorded_sessions import Stretch, sessions, stretches
 from engage_hri.services.recording.disk import read
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.tiers import tiers

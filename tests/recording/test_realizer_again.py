@@ -15,8 +15,7 @@ from engage_hri.schemas.body import PerformBehavior, SyncPointReached
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Received
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.commandline.study.again import Compared, again, told
-from engage_hri.services.commandline.study.realizer_again import distance
+from engage_hri.services.commandline.study.again import Compared, again, distance, told
 from engage_hri.services.control.config import ControlConfig, Variability
 from engage_hri.services.control.service import embody
 from engage_hri.services.realizer.config import RealizerConfig

@@ -9,8 +9,8 @@ from engage_hri.schemas.faults import Cause, EngageError, Fault, NoReply
 from engage_hri.schemas.fragments import PerformFragment, TurnFragment
 from engage_hri.schemas.requests import Accepted, Cancel
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.deadlines import LATE, Sight
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.bus.sight import LATE, Sight
 from engage_hri.services.requests.asking import Asking, Effect, Patience, PublishCommand, TellEnd
 from engage_hri.services.requests.serving import Hand, HoldRequest, Serving
 

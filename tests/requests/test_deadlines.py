@@ -4,8 +4,7 @@ import random
 
 import pytest
 
-from engage_hri.services.bus.sight import Sight
-from engage_hri.services.requests.deadlines import SLACK, Deadlines, Silences
+from engage_hri.services.bus.deadlines import SLACK, Deadlines, Sight, Silences
 from tests.random_cases import share_of
 
 

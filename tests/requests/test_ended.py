@@ -11,9 +11,9 @@ from engage_hri.schemas.blocks import Block, BlockOutcome, PerformBlock
 from engage_hri.schemas.faults import OutcomeUnknown
 from engage_hri.schemas.messages import decode, encode
 from engage_hri.schemas.requests import Accepted
+from engage_hri.services.bus.deadlines import FORGOTTEN_AFTER
 from engage_hri.services.requests.asking import ASLEEP, Asking, Patience, PublishCommand, TellEnd
 from engage_hri.services.requests.serving import Serving
-from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
 from tests.requests.test_serving import BLOCK, DONE, handed, told
 
 

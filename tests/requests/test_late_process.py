@@ -11,9 +11,9 @@ from engage_hri.schemas.faults import NoReply
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.requests import Cancel, KeepAlive, Kept
 from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.bus.deadlines import LATE
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.samples import Received
-from engage_hri.services.bus.sight import LATE
 from engage_hri.services.requests.ends import RequestDesk, unfinished
 from tests.standing_still import stand_still
 

@@ -13,8 +13,8 @@ from engage_hri.schemas.body import BehaviorOutcome, PerformBehavior
 from engage_hri.schemas.faults import EngageError, Fault, ServerRestarted
 from engage_hri.schemas.requests import Accepted, Cancel, Heard, KeepAlive, Kept, Request
 from engage_hri.schemas.units import Stamp
+from engage_hri.services.bus.deadlines import LATE
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.bus.sight import LATE
 from engage_hri.services.requests.asking import Asking, Patience, PublishCommand, Renew, TellEnd
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.requests.serving import Hand, HoldRequest, Serving

@@ -16,7 +16,7 @@ from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.requests import Accepted, Cancel, Heard, KeepAlive, Kept, Outdated, Refused, Request
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.bus.payloads import read_payload
+from engage_hri.services.bus.samples import read_payload
 from engage_hri.services.requests.asking import Asking, Patience, RequestRefused, TellEnd
 from engage_hri.services.requests.asking import PublishCommand as AskedToPublish
 from engage_hri.services.requests.serving import LIFELESS_KEPT, Hand, Names, PublishAnswer, Serving, ServingFault

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from engage_hri.services.runtime.absent import FORGOTTEN_AFTER, Absent, Acquaintances
+from engage_hri.services.bus.deadlines import FORGOTTEN_AFTER, Absent, Acquaintances
 
 NAMES = "abcd"
 STEPS = st.lists(

@@ -93,4 +93,4 @@ def test_reporters_that_are_killed_one_after_the_other_are_not_remembered_for_ev
 
         assert [type(each.observation) for each in taking.advance(10.0 * number + 9)] == [ActionEnded, ActorLost]
 
-    assert len(taking._reporters._reporters) == SILENCED_KEPT
+    assert len(taking._reporters) == SILENCED_KEPT

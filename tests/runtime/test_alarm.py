@@ -3,7 +3,7 @@
 import asyncio
 from typing import Any
 
-from engage_hri.services.runtime.alarm import Alarm, Timer
+from engage_hri.services.runtime.loop import Alarm, Timer
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 
 

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
 from engage_hri.schemas.units import Stamp
+from engage_hri.services.bus.deadlines import FORGOTTEN_AFTER
 from engage_hri.services.reports.ongoing_actions import MOST, ActionEvent, OngoingActionTracker
-from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
 from tests.ongoing import going_on, is_seen
 
 

@@ -25,7 +25,7 @@ from engage_hri.services.commandline.embedding import play_tangram
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import Config, load
 from engage_hri.services.console.follow import following
-from engage_hri.services.generation.turns.events import WORDS_PATIENCE
+from engage_hri.services.generation.turns.outcomes import WORDS_PATIENCE
 from engage_hri.services.runtime.service import running
 from engage_hri.services.simulation.still import show_world, table_world
 

@@ -35,7 +35,6 @@ EXAMPLE = ("tangram.", "control.mujoco.")
 """What knows the tangram: itself, and the physics, whose room has its table."""
 OF_THE_EXAMPLE = {
     "commandline.look.demo", "commandline.shell.config", "commandline.study.session", "commandline.study.simulate",
-    "commandline.study.workers",
 }  # fmt: skip
 """Modules of the commands that play the tangram."""
 

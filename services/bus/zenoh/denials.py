@@ -1,5 +1,4 @@
-"""Refusals of a router in plain lines: links without a good certificate, messages that no rule allows, and too large
-or too many ones. Who sends or asks a great deal is told too, though each message is allowed.
+"""Refusals of a router in plain lines: links without a good certificate, and messages that no rule allows.
 
 Zenoh tells both only in its log, which it writes to the standard output of the process, each message that is allowed
 among them. Who watches over the router reads that, and picks out what was refused. The router itself must not: while
@@ -10,11 +9,13 @@ import re
 from collections import Counter
 from collections.abc import Callable
 
-from engage_hri.schemas.access import LONGEST_KEY, MOST_MESSAGES, MOST_PULSES, MOST_QUESTIONS
+from engage_hri.schemas.access import LONGEST_KEY
 from engage_hri.schemas.text import printable
-from engage_hri.services.bus.often import is_told
+from engage_hri.services.bus.samples import is_told
 
-LEVELS = "error,zenoh_link_tls=debug,zenoh::net::routing::interceptor=trace,zenoh::net::routing::hat=off"
+LEVELS = (
+    "error,zenoh_link_tls=debug,zenoh::net::routing::interceptor::access_control=trace,zenoh::net::routing::hat=off"
+)
 """Parts of Zenoh's log that tell of refusals, and all errors but those about the end of what was denied."""
 MOST = 200
 """Number of different refusals of one holder that are told; a flood of them fills neither log nor memory."""
@@ -37,13 +38,6 @@ _LAST_CACHED = "Declare Liveliness Subscriber"
 _ACCEPTED = re.compile(r"Accepted TLS connection .*Common Name: (?P<name>.*)\.$")
 _NOBODY = re.compile(r"\b(?P<zid>[0-9a-f]++) did not match any configured ACL subject")
 _REFUSED = re.compile(r"zenoh_link_tls\S*: (?P<reason>.*?)(?:\. Hint: .*)?$")
-_TOO_MANY = re.compile(r"dropped by the downsampling interceptor: \w+\((?P<key>.*)\) from:\S*/(?P<zid>\w+):\d+")
-_PACING = b"::downsampling"
-"""The same part of Zenoh in a line: it drops a message that follows another too soon, though there may be few."""
-_DROPPED = b"Msg intercepted!"
-"""Last line about any message that is dropped, whatever the reason. It names nobody."""
-_INGRESS = re.compile(rb"(Put|Query) \(ingress\)")
-_MANY = {b"Put": (MOST_MESSAGES, "messages"), b"Query": (MOST_QUESTIONS, "questions")}
 _LEVEL = re.compile(r"\d{4}-\d\d-\d\dT\S+Z +(?P<level>[A-Z]+) ")
 
 
@@ -56,7 +50,7 @@ class Denials:
 
     def __init__(self, tell: Callable[[str], None]) -> None:
         self._tell = tell
-        self._names: dict[str, str] = {}
+        self._names: dict[bytes, str] = {}
         """Common names by process."""
         self._accepted: dict[bytes, str] = {}
         """Common name of the link that was accepted last, by thread."""
@@ -69,13 +63,6 @@ class Denials:
         """Text of each refusal, by what it counts as."""
         self._kind_of: dict[bytes, str] = {}
         """What lines count as that were told, without their time and thread."""
-        self._zids: frozenset[bytes] = frozenset()
-        """Processes that have a name."""
-        self._before = b""
-        """The last line."""
-        self._second = b""
-        self._sent: Counter[int] = Counter()
-        """Numbers of what each process has sent in this second of the log, by hashes of its id with kind or key."""
 
     def feed(self, line: bytes) -> bool:
         """Take a line of the log. Returns whether it shows that the router takes in something new.
@@ -84,29 +71,18 @@ class Denials:
         """
         if len(line) > LONGEST:
             line = line[:LONGEST] + b"..."
-        before, self._before = self._before, line
-        if line.endswith(_DROPPED):
-            if _is_allowance(before):
-                self._drop(before, line)
-            return False
-        if line.startswith(_PACING, (after := line.find(_AFTER)) + len(_AFTER)):
-            if not self._exceeds(hash(line[after:]), line, MOST_PULSES):
-                return False
-        elif not self._caching and b"caching permissions" not in line and self._is_known(line):
+        if not self._caching and b"caching permissions" not in line and self._is_known(line):
             return False  # by far the most
         text = _COLOR.sub(b"", line).decode(errors="replace").strip()
         if (level := _LEVEL.match(text)) is None:
             return False  # the rest of a line: a key may have line ends
         caching = _CACHING.search(text)
-        thread = _thread(line)
+        found = _THREAD.search(line)
+        thread = found[1] if found else b""
         if (checked := _CHECKED.search(text)) is not None:
             self._check(thread, checked, line)
         elif caching is not None:
             self._caching[thread] = (caching["flow"], caching["key"])
-        elif (many := _TOO_MANY.search(text)) is not None:
-            who = next((name for zid, name in self._names.items() if zid.startswith(many["zid"])), "somebody")
-            news = f"dropped: {who} sends more on {many['key']} than may come in a second"
-            self._say(news, f"of what {who} does")
         elif (accepted := _ACCEPTED.search(text)) is not None:
             self._accepted[thread] = accepted["name"]
         elif (nobody := _NOBODY.search(text)) is not None:
@@ -118,58 +94,24 @@ class Denials:
             self._say(f"refused a link: {refused['reason']}" if refused else f"zenoh: {text}")
         return caching is not None
 
-    def _remember(self, line: bytes, kind: str) -> None:
-        if len(self._kind_of) < MOST:
-            self._kind_of[line[line.find(_AFTER) :]] = kind
-
     def _is_known(self, line: bytes) -> bool:
         """True for a line that says nothing new; one that was told before is counted. Quick, for there are many.
 
         New is an allowance of a process without a name yet, or of a costly key.
         """
         if _is_allowance(line):
-            if (said := _WHO.search(line)) is None or said[1] not in self._zids:
-                return False
-            if (what := _INGRESS.search(line)) is not None:
-                self._sends(said[1], what[1], line)
-            return line.count(b"$*") <= WILD
+            said = _WHO.search(line)
+            return said is not None and said[1] in self._names and line.count(b"$*") <= WILD
         if (kind := self._kind_of.get(line[line.find(_AFTER) :])) is None:
             return False
         self._told_again(kind)
         return True
 
-    def _sends(self, zid: bytes, what: bytes, line: bytes) -> None:
-        """Count what is allowed, and tell of a process that sends more of it in a second than any of ours does."""
-        most, words = _MANY[what]
-        if self._exceeds(hash((zid, what)), line, most):
-            who = self._names[zid.decode()]
-            self._say(f"many: {who} sends more than {most} {words} in a second", f"of what {who} does")
-
-    def _exceeds(self, what: int, line: bytes, most: int) -> bool:
-        """Count it; true at the first that is more than that in the second in which this line was logged."""
-        if (second := line[: line.find(b".")]) != self._second:
-            self._second = second
-            self._sent.clear()
-        self._sent[what] += 1
-        return self._sent[what] == most + 1
-
-    def _drop(self, before: bytes, line: bytes) -> None:
-        """Tell what was dropped though a rule allows it: it is too large. before: what was said of it on that thread.
-
-        Threads write as they come. So one of many may be missed, which is told the next time.
-        """
-        if _thread(before) != _thread(line):
-            return
-        checked = _CHECKED.search(_COLOR.sub(b"", before).decode(errors="replace"))
-        if checked is not None and not checked["verdict"] and checked["flow"] == "ingress":
-            who = self._names.get(checked["zid"], f"process {checked['zid']}")
-            what = f"{checked['what'].lower()} on {checked['key']}"
-            self._say(f"dropped: {who} sends a {what} that is larger than may be sent", f"of what {who} does")
-
     def _check(self, thread: bytes, checked: re.Match[str], line: bytes) -> None:
+        zid = checked["zid"]
         if checked["name"]:
-            self._know(checked["zid"], checked["name"])
-        who = self._names.get(checked["zid"], f"process {checked['zid']}")
+            self._know(zid, checked["name"])
+        who = self._names.get(zid.encode(), f"process {zid}")
         if (wild := checked["key"].count("$*")) > WILD and checked["flow"] == "ingress":
             news = f"costly: {who} has sent a key with {wild} `$*`; while it is matched the router stands still"
             self._say(news, f"of what {who} does")
@@ -182,13 +124,14 @@ class Denials:
         # What is kept from somebody is nothing that they did; and the end of what never began is no news.
         if checked["verdict"] and checked["flow"] == "ingress" and not checked["what"].startswith("Undeclare"):
             news = f"denied: {who} may not {checked['what'].lower()} {checked['key']}"
-            self._remember(line, self._say(news, f"of what {who} does"))
+            kind = self._say(news, f"of what {who} does")
+            if len(self._kind_of) < MOST:
+                self._kind_of[line[line.find(_AFTER) :]] = kind
 
     def _know(self, zid: str, name: str) -> None:
-        if zid not in self._names and len(self._names) >= MOST:
+        if zid.encode() not in self._names and len(self._names) >= MOST:
             self._names.pop(next(iter(self._names)))
-        self._names[zid] = name
-        self._zids = frozenset(each.encode() for each in self._names)
+        self._names[zid.encode()] = name
 
     def _say(self, news: str, part: str = "") -> str:
         """Tell it, if it is new, or has come ten times as often; returns as what it counts.
@@ -212,12 +155,6 @@ class Denials:
         times = self._count[kind]
         if is_told(times):
             self._tell(self._news[kind] if times == 1 else f"{self._news[kind]} ({times} times)")
-
-
-def _thread(line: bytes) -> bytes:
-    """Number of the thread that wrote a line; empty: it is the rest of one."""
-    found = _THREAD.search(line)
-    return found[1] if found else b""
 
 
 def _is_allowance(line: bytes) -> bool:

@@ -26,8 +26,9 @@ from engage_hri.schemas.access import MEDIUM, most
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.messages import decode, in_form
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.zenoh.bridge import LoopBridge
 from engage_hri.services.bus.zenoh.order import Counts, Envelope, Missing, Past, SentLog, Written, fitting
-from engage_hri.services.bus.zenoh.session import QOS, LoopBridge
+from engage_hri.services.bus.zenoh.session import QOS
 
 BATCH = 32
 """Number of replies in one go: a question for everything must not hold up the loop."""

@@ -10,7 +10,6 @@ subscribers, repair of losses in a cut, the list of participants, and questions 
 import asyncio
 import time
 from collections.abc import Callable, Sequence
-from functools import partial
 from importlib.metadata import version
 from itertools import count
 from math import inf
@@ -21,21 +20,20 @@ import msgspec
 import zenoh
 
 from engage_hri.schemas import access, keys
-from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NotReady
-from engage_hri.schemas.messages import Message, decode, in_form, published
+from engage_hri.schemas.faults import Fault, NotReady
+from engage_hri.schemas.messages import Message, published
 from engage_hri.schemas.participants import BusHealth, ProcessFacts
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.bus.answering import Answering
 from engage_hri.services.bus.config import Mode, is_on_this_machine, mode_of
-from engage_hri.services.bus.interface import LOG, Answer, Bus, Hub, Subscription, Tap
-from engage_hri.services.bus.keyring import Keys
-from engage_hri.services.bus.zenoh.answers import Answers
+from engage_hri.services.bus.interface import LOG, Answer, Answering, Bus, Hub, Subscription, Tap
+from engage_hri.services.bus.keyring import Expiry, Keys
+from engage_hri.services.bus.zenoh.bridge import LoopBridge
 from engage_hri.services.bus.zenoh.clocks import Clocks
-from engage_hri.services.bus.zenoh.expiry import Expiry
 from engage_hri.services.bus.zenoh.history import History, pack
 from engage_hri.services.bus.zenoh.links import Links
 from engage_hri.services.bus.zenoh.order import Envelope, SentLog, Written, mark_of
 from engage_hri.services.bus.zenoh.peers import Peers
+from engage_hri.services.bus.zenoh.questions import QuestionEnds
 from engage_hri.services.bus.zenoh.readers import Readers
 from engage_hri.services.bus.zenoh.rights import Rights, check_keys
 from engage_hri.services.bus.zenoh.session import (
@@ -46,10 +44,9 @@ from engage_hri.services.bus.zenoh.session import (
     ROUTER_WITH_KEYS,
     RUST_PLACE,
     STREAM_QOS,
-    LoopBridge,
     open_client,
     open_session,
-)  # fmt: skip
+)
 
 DECLARED = 256
 """Number of keys that are declared at a time: people and clients come and go, each with keys of its own."""
@@ -89,8 +86,6 @@ FIRST_PULSE: Seconds = 0.25
 NEXT_PULSE: Seconds = 1.0
 OPENING: Seconds = 0.5
 """Time that `open_hub` waits for the first other process: one that leaves before is heard by nobody."""
-ASK_AGAIN: Seconds = 0.5
-"""Time without an answer after which a question is asked once more."""
 POLL: Seconds = 0.05
 """Time between two looks for a first link."""
 VACANCY: Seconds = 4.0
@@ -279,7 +274,7 @@ class ZenohHub(Hub):
     def server(self, key: str) -> Answering | None:
         """The answers of the participant in this process that serves the key, if there is one."""
         buses = (bus for hub in self.process for bus in hub._buses.values())
-        return next((bus.answers.here for bus in buses if key in bus.answers.here.served), None)
+        return next((bus.questions.here for bus in buses if key in bus.questions.here.served), None)
 
     def failed(self, error: Exception, what: str) -> None:
         """Tell an error that cannot be assigned to a participant: the first one of the process tells it."""
@@ -352,7 +347,8 @@ class ZenohHub(Hub):
         if recent:
             for flow, counts in recent.items():
                 pulse = self._publishers.of(keys.own(self.run, f"pulse/{flow}"), True)
-                pulse.put(pack(counts), encoding="application/msgpack")
+                # With its sender it takes its turn behind the messages that it counts, and makes nobody ask for them.
+                pulse.put(pack(counts), encoding="application/msgpack", source_info=self._source)
 
 
 class ZenohBus(Bus):
@@ -361,7 +357,7 @@ class ZenohBus(Bus):
     def __init__(self, hub: ZenohHub, name: str, role: str) -> None:
         super().__init__(hub.robot, name, role, hub.clocks.own, hub.run, hub.life_numbers)
         self._hub = hub
-        self.answers = Answers(self, hub.session, hub.bridge)
+        self.questions = QuestionEnds(self, hub.session, hub.bridge, hub.peers, hub.server)
         self._token: Any = None
 
     @property
@@ -404,61 +400,10 @@ class ZenohBus(Bus):
     async def _query(self, key: str, message: Message, deadline: Seconds) -> Message | None:
         if self._hub.rights is not None:
             self._hub.rights.check(self.name, "asks", key)
-        payload, encoding = in_form(key, message, "msgpack")
-        told = await self._try(key, message, payload, encoding, deadline)
-        if told is None:
-            # There is no server, or it died meanwhile.
-            async with self._hub.peers.served(key) as came:
-                while told is None and self._loop.time() < deadline:
-                    await came(deadline, ASK_AGAIN)
-                    told = await self._try(key, message, payload, encoding, deadline)
-        return told
-
-    async def _try(
-        self, key: str, message: Message, payload: bytes, encoding: str, deadline: Seconds
-    ) -> Message | None:
-        """Ask the server of this process, or any other; None if none has answered. Raises InputRefused."""
-        if (server := self._hub.server(key)) is not None:
-            return await server.ask(key, message, deadline, partial(_sendable, key))
-        reply = await self._ask(key, payload, encoding, deadline)
-        if reply is not None and reply.ok is not None:
-            return decode(reply.ok.payload.to_bytes(), str(reply.ok.encoding))
-        if reply is not None and reply.err is not None:
-            raise InputRefused(_fault(reply.err.payload.to_bytes(), str(reply.err.encoding)))
-        return None
-
-    async def _ask(self, key: str, payload: bytes, encoding: str, deadline: Seconds) -> zenoh.Reply | None:
-        """Ask until the first answer; None once every try has ended without one.
-
-        The question is repeated, as a cut may swallow it; answers change nothing, so a second one does no harm.
-        """
-        answered: asyncio.Future[zenoh.Reply | None] = self._loop.create_future()
-        going = 0
-
-        def settle(reply: zenoh.Reply | None) -> None:
-            if not answered.done():
-                answered.set_result(reply)
-
-        def replied(reply: zenoh.Reply) -> None:
-            # Errors of Zenoh itself, such as a timeout, are no answer of a server.
-            if reply.ok is not None or (reply.err is not None and _is_ours(str(reply.err.encoding))):
-                settle(reply)
-
-        def ended(_: Any) -> None:
-            nonlocal going
-            going -= 1
-            if not going:
-                settle(None)
-
-        while not answered.done():
-            left = deadline - self._loop.time()
-            going += 1
-            self._hub.peers.ask(key, payload, replied, ended, max(left, 0.01), encoding)
-            await asyncio.wait([answered], timeout=min(max(left, 0.0) + 0.1, ASK_AGAIN))
-        return answered.result()
+        return await self.questions.query(key, message, deadline)
 
     def answer(self, key: str, answer: Answer, *, empty: Message | None = None) -> None:
-        self.answers.serve(key, answer, empty)
+        self.questions.serve(key, answer, empty)
 
     def declare_alive(self) -> None:
         if self._token is None and not self._gone:
@@ -477,26 +422,8 @@ class ZenohBus(Bus):
         self._gone = True
         for reader in tuple(self._readers):
             reader.close()
-        self.answers.close()
+        self.questions.close()
         if self._token is not None:
             self._token.undeclare()
             self._hub.note(self, False)
         self._hub.forget(self.name)
-
-
-def _sendable(key: str, message: Message) -> Message:
-    """The message, which stays in this process. Raises InputRefused if it could not leave it."""
-    in_form(key, message, "msgpack")
-    return message
-
-
-def _is_ours(encoding: str) -> bool:
-    return encoding.startswith("application/")
-
-
-def _fault(payload: bytes, encoding: str) -> Fault:
-    try:
-        fault = decode(payload, encoding)
-    except EngageError as error:
-        return error.fault
-    return fault if isinstance(fault, Fault) else Fault(reason=f"answered with {type(fault).__name__}")

@@ -11,89 +11,62 @@ import asyncio
 import socket
 from collections.abc import Callable, Sequence
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any
 
 import zenoh
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.zenoh.session import LoopBridge
+from engage_hri.services.bus.zenoh.bridge import LoopBridge
 from engage_hri.services.bus.zenoh.volume import end, place
 
 SETTLE: Seconds = 1.0
 """Time without a router after which that is told: a link that breaks is called again within half a second."""
 
 
-class Router(NamedTuple):
-    """A router that this process has a link to. zid: Zenoh's id of its process."""
-
-    zid: str
-    endpoint: str
-
-
 class RouterNews:
-    """Lines about the routers of this process, each told once. Pure: time is an argument.
+    """Lines about the routers of this process: that there is none, and that there is one again. Pure.
 
-    A link that breaks and is there again within `SETTLE`, to the same process, is no news.
+    A link that breaks, to whichever router, is no news if there is one within `SETTLE`: nothing is lost then.
     """
 
     def __init__(self) -> None:
-        self._here: dict[str, Router] = {}
-        self._known: Router | None = None
-        """The router that was told last, or that was there first."""
+        self._here: dict[str, str] = {}
+        """Endpoints of the routers with a link, by Zenoh's id of their process."""
+        self._last = ""
+        """Endpoint of the last one; empty: there was none so far."""
         self._is_told_gone = False
         self._gone_at: Seconds = 0.0
         self._back_at: Seconds = -inf
         self.deadline: Seconds | None = None
         """Time at which `due` has something to tell, should no router come before."""
 
-    def came(self, router: Router, now: Seconds) -> str | None:
+    def came(self, zid: str, endpoint: str, now: Seconds) -> str | None:
         """Take a link that is there now; returns the line to tell."""
-        if self._known is not None and not self._here:
+        if self._last and not self._here:
             self._back_at = now
-        self._here[router.zid] = router
+        self._here[zid] = self._last = endpoint
         self.deadline = None
-        known, was_told = self._known, self._is_told_gone
-        if known is not None and known.zid in self._here and not was_told:
-            return None
-        self._known, self._is_told_gone = router, False
-        if was_told:
-            return f"a router is there again, at {router.endpoint}, after {now - self._gone_at:.1f} s"
-        if known is None:
-            return None
-        return _replaced(known, router)
+        was_told, self._is_told_gone = self._is_told_gone, False
+        return f"a router is there again, at {endpoint}, after {now - self._gone_at:.1f} s" if was_told else None
 
     def unlinked_at(self, now: Seconds) -> Seconds:
         """Time at which there was no router last; -inf: there has always been one, or there never was."""
-        return self._back_at if self._here or self._known is None else now
+        return self._back_at if self._here or not self._last else now
 
-    def went(self, zid: str, now: Seconds) -> str | None:
-        """Take a link that is no more; returns the line to tell."""
-        if self._here.pop(zid, None) is None:
-            return None
-        if not self._here:
+    def went(self, zid: str, now: Seconds) -> None:
+        """Take a link that is no more."""
+        if self._here.pop(zid, None) is not None and not self._here:
             self._gone_at, self.deadline = now, now + SETTLE
-        elif self._known is not None and self._known.zid == zid:
-            known, self._known = self._known, next(iter(self._here.values()))
-            return _replaced(known, self._known)
-        return None
 
     def due(self, now: Seconds, direct: int) -> str | None:
         """Tell at the deadline that there is no router. direct: number of processes that are linked without one."""
-        if self.deadline is None or now < self.deadline or self._known is None:
+        if self.deadline is None or now < self.deadline:
             return None
         self.deadline, self._is_told_gone = None, True
+        left = "no other process is heard, nor hears this one"
         if direct:
-            left = f"only the {direct} with a direct link are" if direct > 1 else "only the one with a direct link is"
-            left = f"of other processes {left} heard"
-        else:
-            left = "no other process is heard, nor hears this one"
-        return f"the router at {self._known.endpoint} is gone: {left}. This process goes on, and keeps calling it"
-
-
-def _replaced(before: Router, now: Router) -> str:
-    if before.endpoint == now.endpoint:
-        return f"the router at {now.endpoint} was started anew; all links are back"
-    return f"the router at {before.endpoint} is gone; the one at {now.endpoint} has taken over"
+            left = f"of other processes only the {direct} with a direct link are heard"
+        return f"the router at {self._last} is gone: {left}. This process goes on, and keeps calling it"
 
 
 class Links:
@@ -139,9 +112,9 @@ class Links:
             return
         now = self._loop.time()
         if there:
-            self._say(self._news.came(Router(zid, self._endpoint(zid)), now))
+            self._say(self._news.came(zid, self._endpoint(zid), now))
         else:
-            self._say(self._news.went(zid, now))
+            self._news.went(zid, now)
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None

@@ -7,8 +7,8 @@ selects by the key. If all got all tokens, those of N clients would cost the rou
 
 import asyncio
 import re
-from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Sequence
-from contextlib import asynccontextmanager, suppress
+from collections.abc import Callable, Collection, Sequence
+from contextlib import suppress
 from typing import Any, TypeVar
 
 import msgspec
@@ -17,10 +17,11 @@ import zenoh
 from engage_hri.schemas import keys
 from engage_hri.schemas.participants import Reachable
 from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.bus.zenoh.bridge import LoopBridge
 from engage_hri.services.bus.zenoh.clocks import REFRESH, Clocks
 from engage_hri.services.bus.zenoh.history import BAD, finish, pack
 from engage_hri.services.bus.zenoh.order import Counts, SentLog, mark_of
-from engage_hri.services.bus.zenoh.session import QOS, LoopBridge
+from engage_hri.services.bus.zenoh.session import QOS
 
 FLUSH: Seconds = 2.0
 """Time that closing waits until the others have everything: as long as a silent one counts as alive."""
@@ -289,30 +290,6 @@ class Peers:
         question = pack((self._sent.run, recent))
         self.ask(keys.own("*", f"flush/{flow}"), question, lambda reply: None, lambda _: _resolve(done), FLUSH)
         await done
-
-    @asynccontextmanager
-    async def served(self, key: str) -> AsyncIterator[Callable[[Seconds, Seconds], Awaitable[None]]]:
-        """Watch for servers of a key. Gives what waits for one: until a deadline, or for a pause if one is there."""
-        came, is_there = asyncio.Event(), False
-
-        def changed(status: zenoh.MatchingStatus) -> None:
-            nonlocal is_there
-            if is_there := bool(status.matching):
-                came.set()
-
-        async def wait(deadline: Seconds, pause: Seconds) -> None:
-            with suppress(TimeoutError):
-                async with asyncio.timeout_at(min(deadline, self._loop.time() + pause) if is_there else deadline):
-                    await came.wait()
-            came.clear()
-
-        querier = self._session.declare_querier(key)
-        listener: Any = querier.declare_matching_listener(self._bridge.on_loop(changed))
-        try:
-            yield wait
-        finally:
-            listener.undeclare()
-            querier.undeclare()  # type: ignore[no-untyped-call]
 
 
 def _without_settings(endpoint: str) -> str:

@@ -18,8 +18,9 @@ from engage_hri.schemas.requests import Unreadable
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import LOG, Bus, Received, Sample, Subscription, Tap
-from engage_hri.services.bus.payloads import read_payload
+from engage_hri.services.bus.samples import read_payload
 from engage_hri.services.bus.subscription import offer_presence
+from engage_hri.services.bus.zenoh.bridge import Arrived, LoopBridge
 from engage_hri.services.bus.zenoh.history import BAD, PATTERNS, History, envelopes, finish, refuse
 from engage_hri.services.bus.zenoh.order import (
     Counts,
@@ -35,7 +36,6 @@ from engage_hri.services.bus.zenoh.order import (
     together,
 )
 from engage_hri.services.bus.zenoh.peers import Peers
-from engage_hri.services.bus.zenoh.session import Arrived, LoopBridge
 
 _pulses = msgspec.msgpack.Decoder(Counts)
 _flushes = msgspec.msgpack.Decoder(tuple[str, Counts])

@@ -7,23 +7,16 @@ It ends the link of one who reads nothing. Zenoh would, but waits for the other 
 each further message for that link halts whoever sends it (docs/decisions/0135-a-link-that-is-not-read-is-ended.md).
 """
 
-import asyncio
 import os
 import socket
 import struct
-import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any, NamedTuple
 
 from engage_hri.schemas.access import LOUD, LOUD_ROBOT
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.zenoh.crowd import Link
 
-LOOK: Seconds = 0.05
-"""Least time between two looks at links that may be ended."""
-SHARE = 0.02
-"""Most part of the time that looking takes: of a thousand links that is a look each half second."""
 SPAN: Seconds = 1.0
 """Time over which their speed is taken."""
 FULL = 32_768
@@ -35,6 +28,17 @@ EXCUSED = 4
 _COUNTS = 120
 """Place of `tcpi_bytes_acked` and `tcpi_bytes_received` in the kernel's `struct tcp_info`, and after the numbers of
 segments `tcpi_notsent_bytes`."""
+
+
+class Link(NamedTuple):
+    """A link of the router. zid: of the process at its other end. name: that in its certificate, if it has one.
+
+    address: of its other end, as Zenoh writes it.
+    """
+
+    zid: str
+    name: str
+    address: str
 
 
 class Volume(NamedTuple):
@@ -89,53 +93,6 @@ class Unread:
                 taken, since = before.get(link, (volume.taken, now))
                 self._since[link] = (volume.taken, since if taken == volume.taken else now)
         return [link for link, (_, since) in self._since.items() if now >= since + UNREAD]
-
-
-class Listening:
-    """Looks at the links of this process, and tells who is loud or reads nothing, until it is closed."""
-
-    def __init__(
-        self,
-        links: Mapping[str, Link],
-        tell: Callable[[str], None],
-        unread: Callable[[Link], None],
-        went: Callable[[Link], None],
-    ) -> None:
-        """links: those that there are, by the address at the other end. unread: called with one to end.
-
-        went: called with one that has ended: Zenoh says nothing of one that it has closed because it was full.
-        """
-        self._links = links
-        self._tell = tell
-        self._end = unread
-        self._went = went
-        self._loop = asyncio.get_running_loop()
-        self._volumes, self._unread = Volumes(self._loop.time()), Unread()
-        self._next = self._loop.time() + SPAN
-        self._timer = self._loop.call_later(LOOK, self._look)
-
-    def close(self) -> None:
-        self._timer.cancel()
-
-    def _look(self) -> None:
-        began = time.perf_counter()
-        found, now = volumes(), self._loop.time()
-        if found:  # no kernel but Linux' tells
-            for link in [link for where, link in self._links.items() if where not in found]:
-                if link.address.startswith(("tcp/", "tls/")):
-                    self._went(link)
-        for where in self._unread.look(found, now):
-            if where in self._links:
-                self._end(self._links[where])
-        if now >= self._next:
-            self._next = now + SPAN
-            names = {where: link.name for where, link in self._links.items() if link.name}
-            for line in self._volumes.look(found, names, now):
-                self._tell(line)
-        took = time.perf_counter() - began
-        # Without keys no link is ended, and only speeds are looked at.
-        pause = LOOK if any(link.name for link in self._links.values()) else SPAN
-        self._timer = self._loop.call_later(max(pause, took / SHARE), self._look)
 
 
 def place(endpoint: str) -> str:

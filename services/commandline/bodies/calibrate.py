@@ -1,5 +1,6 @@
 """Command `engage calibrate body`: measure where a body really looks and points, and write what corrects it."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +15,6 @@ from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity
 from engage_hri.services.commandline.shell.options import Configured
 from engage_hri.services.commandline.shell.process import DONE, run, typed
-from engage_hri.services.commandline.shell.result_folder import ResultFile
 from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.control.calibrating.fitting import Fit, Measurement, fit
 from engage_hri.services.control.calibrating.measuring import OTHER_ROWS, Eyes, SimulatedEyes, marks, measured
@@ -49,6 +49,29 @@ class Options(Configured):
     spread: Annotated[
         float, typer.Option(metavar="METRES", min=0.0, help="How well simulated eyes measure a place.")
     ] = 0.003
+
+
+class ResultFile:
+    """File for a result. Raises InputRefused if it cannot be written."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        folder, reason = path.parent, ""
+        if path.is_dir():
+            reason = "is a folder"
+        elif not folder.is_dir():
+            reason = f"there is no folder {folder}"
+        elif not os.access(path if path.exists() else folder, os.W_OK):
+            reason = "cannot be written"
+        if reason:
+            raise InputRefused(Fault(reason=reason, where=str(path)))
+
+    def write(self, content: bytes) -> None:
+        """Write the whole. Raises RunFailed."""
+        try:
+            self.path.write_bytes(content)
+        except OSError as error:
+            raise RunFailed(Fault(reason=f"cannot write: {error.strerror}", where=str(self.path))) from error
 
 
 class AskedEyes:

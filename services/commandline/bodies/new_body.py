@@ -1,11 +1,12 @@
 """Command `engage new-body`: write the driver of a robot, for its author to go on from.
 
 The file runs and keeps the contract of bodies as it is written, on servos that are simulated. Its author puts an SDK
-in their place, and `engage check-body` then tells what that has changed.
+in their place, and `engage check-body` then tells what that has changed. Its text is `driver.txt`, beside this file.
 """
 
 import re
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
 from string import Template
 from typing import Annotated
@@ -16,42 +17,6 @@ from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.services.commandline.shell.failing_output import print_format
 from engage_hri.services.commandline.shell.process import DONE
 
-DRIVER = Template('''\
-"""A head on two servos that take set points: `engage check-body $file`."""
-
-import math
-
-from engage_hri import Head, JointLimit, Ray, SetPointBody, SimulatedServos
-
-
-class $class_name(SetPointBody):
-    name, part, types = "$name", "head", ("gaze", "gazeShift", "head")
-    joints = tuple(
-        JointLimit(joint=joint, part="head", low=-1.5, high=1.5, speed=5.0, acceleration=60.0)
-        for joint in ("pan", "tilt")
-    )
-    settling = 0.15  # seconds by which the servos lag
-
-    async def open(self):
-        self.servos = SimulatedServos(self.joints)  # your SDK
-
-    def send(self, angles):
-        self.servos.send(angles)
-
-    def angles(self):
-        return self.servos.angles()
-
-    def aim(self, behavior, world):
-        if isinstance(behavior, Head):
-            return {"pan": 0.0, "tilt": -0.3}
-        x, y, z = (there - here for there, here in zip(self.position(behavior, world), self.eyes, strict=True))
-        return {"pan": math.atan2(y, x), "tilt": math.atan2(z, math.hypot(x, y))}
-
-    def gaze(self, angles):
-        pan, tilt = angles["pan"], angles["tilt"]
-        axis = (math.cos(tilt) * math.cos(pan), math.cos(tilt) * math.sin(pan), math.sin(tilt))
-        return Ray(origin=self.eyes, axis=axis)
-''')
 NEXT = """\
 Wrote {file}: a head on two servos, which are simulated. Next:
 
@@ -75,7 +40,8 @@ def main(options: Options) -> int:
         advice = "small letters and digits, with hyphens between words, as in my-robot"
         raise InputRefused(Fault(reason=f"{options.name!r} is no name of a robot", where="--name", advice=advice))
     file = Path(f"{options.name.replace('-', '_')}.py")
-    text = DRIVER.substitute(file=file, name=options.name, class_name=options.name.title().replace("-", ""))
+    template = Template((files(__package__) / "driver.txt").read_text(encoding="utf-8"))
+    text = template.substitute(file=file, name=options.name, class_name=options.name.title().replace("-", ""))
     try:
         with file.open("x", encoding="utf-8") as written:
             written.write(text)

@@ -1,6 +1,7 @@
 """Command `engage demo`: the whole system in this process plays the anchor tangram with a simulated person."""
 
 import asyncio
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -9,9 +10,10 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline.embedding import play_tangram
-from engage_hri.services.commandline.look.with_window import can_open, lacking, not_installed, windowed
+from engage_hri.services.commandline.look.window import can_open, web, windowed
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.options import Embodied, Shown, Simulated, VirtualTime, Written
 from engage_hri.services.commandline.shell.outputs import Outputs
@@ -59,8 +61,10 @@ def main(options: Options) -> int:
         console = outputs.console(quiet=options.quiet)
         live = console.is_terminal and not options.virtual_time and not options.quiet
         window = can_open(live) if options.window is None and not options.you else options.window is not False
+        if window:
+            web()
         result = run(demonstrate(config, outputs, console, live, options, window), virtual_time=options.virtual_time)
-        console.print(tally.render(result, config.robot, console.width))
+        console.print(tally.render(result, config.robot))
     return DONE
 
 
@@ -74,35 +78,18 @@ def _check(options: Options) -> None:
             raise InputRefused(Fault(reason=reason, where=option, advice=advice))
     if options.you and options.window is False:
         raise InputRefused(Fault(reason="the seat is in the window", where="--you", advice="leave out --no-window"))
-    if (options.you or options.window) and (package := lacking()):
-        raise InputRefused(not_installed(package))
 
 
 async def demonstrate(
     config: Config, outputs: Sink, console: Console, live: bool, options: Options, window: bool = False
 ) -> tally.Tally:
-    """Run everything until the task is over. Returns the tally of the events. window: show it in the browser, too.
-
-    Raises RunFailed: the window has ended, and the person would sit in it.
-    """
+    """Run everything until the task is over. Returns the tally of the events. window: show it in the browser, too."""
     began = asyncio.get_running_loop().time()
     tallying = Tallying(began)
-    with scene_view(console, config.robot, began, live) as show:
-        if not window:
-            await play_tangram(config, (show, tallying, outputs), record=options.record)
-            return tallying.tally
-        tell = partial(console.print, highlight=False, markup=False)
-        async with windowed(config.robot, options, began, tell) as beside:
-            task = play_tangram(config, (show, tallying, outputs), beside.hub, options.record)
-            playing = asyncio.create_task(task, name="tangram")
-            try:
-                waiting = {playing, beside.ended} if options.you else {playing}
-                await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
-                if not playing.done():
-                    code = beside.ended.result()
-                    raise RunFailed(Fault(reason=f"the window has ended with exit code {code}", where="--you"))
-                playing.result()
-            finally:
-                playing.cancel()
-                await asyncio.wait([playing])
+    tell = partial(console.print, highlight=False, markup=False)
+    async with MemoryHub(config.robot, decodes=False) as hub:
+        beside = windowed(hub, options, began, tell) if window else nullcontext()
+        with scene_view(console, config.robot, began, live) as show:
+            async with beside:
+                await play_tangram(config, (show, tallying, outputs), hub, options.record)
     return tallying.tally

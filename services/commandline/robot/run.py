@@ -10,10 +10,16 @@ import typer
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.bus.interface import Hub
-from engage_hri.services.commandline.shell import forced_exit, roster
+from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.failing_output import complain
 from engage_hri.services.commandline.shell.options import Embodied, Listening
-from engage_hri.services.commandline.shell.process import DONE, run_until_signal, unique_name, until_closed
+from engage_hri.services.commandline.shell.process import (
+    DONE,
+    end_after_the_parent,
+    run_until_signal,
+    unique_name,
+    until_closed,
+)
 from engage_hri.services.commandline.shell.roster import ROBOT, complete
 from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.runtime.service import Service, running
@@ -46,7 +52,7 @@ def main(options: Options) -> int:
     if (options.body or options.voice) and "control" not in names:
         raise InputRefused(Fault(reason="--body and --voice are for control", advice="engage run control --body ..."))
     if options.attended:
-        forced_exit.end_after_the_parent()
+        end_after_the_parent()
     on_robot = {*names} <= {*ROBOT}
     config = options.load() if on_robot else options.read(complete())
     run_until_signal(_serve(options, names, config))

@@ -101,7 +101,7 @@ async def _serve(
             over = await stack.enter_async_context(serving)
             await over.wait()
     if options.task:
-        console.print(tally.render(tallying.tally, config.robot, console.width))
+        console.print(tally.render(tallying.tally, config.robot))
 
 
 def without_faults(show: Sink) -> Sink:

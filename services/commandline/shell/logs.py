@@ -18,7 +18,7 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.text import printable
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus import journal
-from engage_hri.services.bus.often import Often
+from engage_hri.services.bus.samples import Often
 from engage_hri.services.commandline.shell.failing_output import Patient, without_waiting
 
 LEVELS = {name.lower(): getattr(logging, name) for name in ("DEBUG", "INFO", "WARNING", "ERROR")}

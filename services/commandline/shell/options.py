@@ -35,6 +35,11 @@ WorldFile = Annotated[
 ]
 
 
+def strict_refusal(warnings: int) -> InputRefused:
+    """Error with which `--strict` fails."""
+    return InputRefused(Fault(reason=f"{warnings} warning{'s' * (warnings > 1)}; --strict allows none"))
+
+
 def simulation_settings(seed: int | None, human: str | None, resolution: str | None) -> tuple[str, ...]:
     """Translate options of the simulation to settings of the configuration."""
     chosen = {

@@ -39,7 +39,7 @@ class Terminal(Console):
         super().__init__(emoji=False, markup=False, **settings)
 
     def on_broken_pipe(self) -> None:
-        raise  # the BrokenPipeError, for services/commandline/shell/exit_codes.py
+        raise  # the BrokenPipeError, for services/commandline/shell/process.py
 
 
 class Outputs:

@@ -1,19 +1,31 @@
-"""Process of a command: its event loop, the signals that stop it, its exit codes."""
+"""Process of a command: its event loop, the signals that stop it, its errors in words, its exit codes.
+
+Ctrl-C has to end a command whatever it is in, and the body has to come home first. So the first signal cancels, and
+what was begun is ended in order; a second one does not wait for that. A handler of Python's runs between two steps of
+Python, to which a driver that blocks in C does not come back: there the system itself is told, before anything
+blocks, what to do then. On other systems than Linux with glibc nothing is told, and only SIGKILL (or Ctrl-\\) ends
+such a process.
+"""
 
 import asyncio
+import ctypes
+import errno
 import os
 import signal
 import sys
 import time
 import uuid
-from collections.abc import Coroutine
+from collections.abc import Coroutine, Sequence
 from contextlib import suppress
 from importlib import import_module
+from pathlib import Path
 from types import FrameType
 from typing import Any, TypeVar
 
+import typer
+
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NotReady, RunFailed
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.commandline.shell import forced_exit
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 
 T = TypeVar("T")
@@ -67,11 +79,11 @@ async def _interruptible(main: Coroutine[Any, Any, T]) -> T:
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         signal.signal(signal.SIGINT, _leave)
-        forced_exit.end_at_the_second(signal.SIGINT)  # what blocks from now on ends at the one after the next
+        end_at_the_second(signal.SIGINT)  # what blocks from now on ends at the one after the next
         cancel(number, frame)
 
     signal.signal(signal.SIGINT, interrupt)
-    forced_exit.end_at_the_second(signal.SIGINT)
+    end_at_the_second(signal.SIGINT)
     return await main
 
 
@@ -174,3 +186,133 @@ def _fastest_loop() -> Any:
         return import_module("uvloop").new_event_loop
     except ImportError:
         return asyncio.SelectorEventLoop
+
+
+_PARENT_DIED = signal.SIGUSR2 if sys.platform == "linux" else 0
+ORPHAN_PATIENCE: Seconds = float(_PARENT_DIED)
+"""Time in which a process whose parent has died is to end by itself: the number of the signal that tells of it, for
+the handler of that signal is the system's `alarm`, which takes a number of seconds."""
+_PR_SET_PDEATHSIG = 1
+_DEFAULT = 0
+
+
+def end_at_the_second(number: signal.Signals) -> None:
+    """Let the system end the process at a second signal, if Python has not taken up the first by then.
+
+    number: of a signal that has a handler of Python's. Whoever handles it sets the handler anew.
+    """
+    with suppress(OSError, AttributeError, TypeError):
+        library = _library()
+        handler = library.signal(number, _DEFAULT)
+        library.sysv_signal(number, handler)
+
+
+def end_after_the_parent() -> None:
+    """Let the system end the process `ORPHAN_PATIENCE` after its parent has died, if it has not ended by itself."""
+    with suppress(OSError, AttributeError, TypeError):
+        library = _library()
+        library.signal(_PARENT_DIED, ctypes.cast(library.alarm, ctypes.c_void_p))
+        library.prctl(_PR_SET_PDEATHSIG, _PARENT_DIED)
+
+
+def _library() -> Any:
+    """The library of C. Raises OSError, AttributeError or TypeError: it is another one."""
+    if sys.platform != "linux":
+        raise OSError
+    library = ctypes.CDLL(None)
+    for function in (library.signal, library.sysv_signal):
+        function.restype, function.argtypes = ctypes.c_void_p, (ctypes.c_int, ctypes.c_void_p)
+    return library
+
+
+UsageError: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "UsageError")
+"""Class of Typer's errors of usage, which it does not export."""
+TYPERS_OWN = 130
+"""Exit code that Typer gives after a KeyboardInterrupt, by whatever signal."""
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
+def exit_code(app: typer.Typer, arguments: Sequence[str] | None) -> int:
+    """Run a command and print its errors on standard error. An exception that is a bug of ours is raised."""
+    try:
+        code = _run(app, arguments)
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        silence()  # the reader of our output (`| head`) has had enough
+        code = UNREAD
+    except OSError as error:
+        if error.errno not in NO_ROOM:
+            raise
+        silence()
+        code = _ended([RunFailed(Fault(reason=f"cannot write the output: {error.strerror}"))])
+    return code
+
+
+def _run(app: typer.Typer, arguments: Sequence[str] | None) -> int:
+    """Run a command to its exit code. Raises BrokenPipeError if the reader of the output is gone."""
+    try:
+        code = int(app(arguments, standalone_mode=False) or DONE)
+        return interrupted() if code == TYPERS_OWN else code
+    except SystemExit as exit:
+        if isinstance(exit.__context__, BrokenPipeError):
+            raise exit.__context__ from None  # Typer makes exit code 1 of it
+        raise
+    except UsageError as error:
+        return _misused(error)
+    except EngageError as error:
+        return _ended([error])
+    except BaseExceptionGroup as group:
+        expected, bugs = group.split((EngageError, BrokenPipeError))
+        if expected is None or bugs is not None:
+            raise
+        return _ended(_leaves(expected))
+    except KeyboardInterrupt:
+        return interrupted()
+
+
+def _misused(error: Any) -> int:
+    """Print an error of usage in one line. The message is empty if Typer has printed the help."""
+    if message := error.format_message().replace("\n", " ").replace("Value error, ", ""):
+        command = error.ctx.command_path if error.ctx else "engage"
+        print(f"{command}: {message} (see {command} --help)", file=sys.stderr)
+    return REFUSED
+
+
+def readable(fault: Fault, source: Path | str = "") -> str:
+    """Write a fault as `turn.xml:14: block-1: gaze-9: reason (advice)`.
+
+    source: the file that it is about, if known.
+    """
+    file, rest = _split(fault.where, str(source))
+    place = f"{file}:{fault.line}" if fault.line else file
+    text = ": ".join(part for part in (place, rest, fault.reason) if part)
+    text = f"{text} ({fault.advice})" if fault.advice else text
+    return " ".join(text.split()).encode(errors="backslashreplace").decode()  # a file name need not be UTF-8
+
+
+def _split(where: str, source: str) -> tuple[str, str]:
+    """Split the place of a fault into the file and the rest; the line number goes between the two."""
+    if source:
+        return source, where.removeprefix(source).removeprefix(": ")
+    file, _, rest = where.partition(": ")
+    return file, rest
+
+
+def _leaves(group: BaseExceptionGroup[Any]) -> list[BaseException]:
+    found: list[BaseException] = []
+    for error in group.exceptions:
+        found += _leaves(error) if isinstance(error, BaseExceptionGroup) else [error]
+    return found
+
+
+def _ended(errors: Sequence[BaseException]) -> int:
+    """Print the faults of expected errors. Returns the exit code; raises a BrokenPipeError that comes alone."""
+    expected = [error for error in errors if isinstance(error, EngageError)]
+    for error in expected:
+        print(readable(error.fault), file=sys.stderr)
+    if not expected:
+        raise errors[0]
+    if any(not isinstance(error, InputRefused) for error in expected):
+        return FAILED
+    return UNREADY if all(isinstance(error, NotReady) for error in expected) else REFUSED

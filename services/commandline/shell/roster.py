@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.commandline.shell.settings import ELSEWHERE, RobotConfig
-from engage_hri.services.runtime.installation import extra_command
-from engage_hri.services.runtime.offers import SERVICES, offers
+from engage_hri.services.runtime.installation import SERVICES, extra_command, offers
 from engage_hri.services.runtime.service import Service
 
 if TYPE_CHECKING:

@@ -1,28 +1,39 @@
 """Services once more, over a recording: each takes what its ledger says that it took, and is to do the same.
 
-Which service is played how is in one table, `SERVICES`: a new one is a row.
+A change of the code may change what a robot does, and no test has all the sessions that people have had with it. A
+recorded session that is done once more tells whether it would go as it went; or, with other settings, what those
+would have made of the same people.
+
+A service with an intake is asked step by step, and the fingerprint of what follows from each step has to be that of
+the ledger (`SERVICES`: a new service is a row). The realizer has none, and runs as it is (`realizer_again.py`).
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
-from msgspec import Struct, structs
+from msgspec import Struct
+from msgspec.structs import replace
 from rich.console import Console
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.advice import explained
+from engage_hri.schemas.blocks import PredictionFeedback, SyncPointProgress
+from engage_hri.schemas.body import PerformBehavior
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.messages import Message
 from engage_hri.schemas.participants import Step, Taken
 from engage_hri.schemas.recognition import ConnectionEvent, session_of
+from engage_hri.schemas.requests import KeepAlive
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.samples import Received
 from engage_hri.services.commandline.shell.process import DONE
 from engage_hri.services.commandline.shell.recording_file import opened
 from engage_hri.services.commandline.shell.settings import RobotConfig
-from engage_hri.services.commandline.study.realizer_again import OtherWords, SentMessage, compared, played
+from engage_hri.services.commandline.study.realizer_again import SentMessage, played
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.serving.intake import ControlIntake
 from engage_hri.services.control.serving.steps import ControlStep
@@ -33,15 +44,17 @@ from engage_hri.services.recognition import intake as recognition
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.settings import flat, settings_of
-from engage_hri.services.runtime.again import Again, Find, Lack, StepDifference
+from engage_hri.services.runtime.again import Again, Lack, StepDifference
 from engage_hri.services.runtime.configuration import read
-from engage_hri.services.runtime.intake import PublishMessage, ServiceIntake
-from engage_hri.services.runtime.ledger import StepClock
+from engage_hri.services.runtime.intake import PublishMessage, ServiceIntake, StepClock
 
 DIFFERENT = 1
 """Exit code if a service does something else with the same settings, and nothing is missing."""
 SHOWN = 10
-"""Differences that are printed."""
+"""Messages that differ that are printed."""
+NEAR: Seconds = 0.05
+"""Greatest difference of times that count as the same for the realizer, whose timers were late when it lived: a loop
+that is so late has stood still (`bus/sight.py`)."""
 
 
 class PlayedService(NamedTuple):
@@ -62,60 +75,39 @@ SERVICES = {
     "generation": PlayedService(GenerationConfig, generation.GenerationIntake, generation.Content),
     "recognition": PlayedService(RecognitionConfig, recognition.Intake, recognition.Content),
 }
-
-
 CONFIGS: dict[str, type[Struct]] = {
     "realizer": RealizerConfig, **{name: service.config for name, service in SERVICES.items()}
 }  # fmt: skip
-"""Services that can be played to, and the type of the configuration of each. The realizer has no intake."""
+"""Services that can be played to, and the type of the configuration of each."""
+
+
+class OtherWords(Struct, frozen=True):
+    """A message that only one side has, or that says something else. None: that side has none."""
+
+    live: SentMessage | None
+    again: SentMessage | None
 
 
 class Compared(Struct, frozen=True, kw_only=True):
     """One life of a service, live and again. differences: steps that led to something else again, in order.
 
-    live, again: changes of connection events that it published; only recognition has some. other_words: messages that
-    say something else again, and furthest: greatest difference of times of all others; only of the realizer.
+    live, again: connection events as recognition published them; all that the realizer published; else nothing.
+    other_words: those of them that say something else, and furthest: greatest difference of times of all others.
     """
 
     service: str
     session: str
     steps: int
-    differences: tuple[StepDifference, ...]
     lack: Lack
-    live: tuple[ConnectionEvent, ...] = ()
-    again: tuple[ConnectionEvent, ...] = ()
+    differences: tuple[StepDifference, ...] = ()
+    live: tuple[SentMessage, ...] = ()
+    again: tuple[SentMessage, ...] = ()
     other_words: tuple[OtherWords, ...] = ()
     furthest: Seconds = 0.0
 
     @property
     def is_same(self) -> bool:
         return not self.differences and not self.other_words
-
-    def changed_events(self) -> list[tuple[ConnectionEvent | None, ConnectionEvent | None]]:
-        """Changes of events that only one side has, or that differ: of one event and state together.
-
-        If the first steps are missing, events are numbered otherwise again, and are known by what they are.
-        """
-        live, again = self._named(self.live), self._named(self.again)
-        names = [*live, *(name for name in again if name not in live)]
-        pairs = ((live.get(name), again.get(name)) for name in names)
-        return [(one, other) for one, other in pairs if not self._is_one(one, other)]
-
-    def _named(self, changes: Iterable[ConnectionEvent]) -> dict[tuple[object, ...], ConnectionEvent]:
-        """Changes by their event, their state, and how often that was told before."""
-        told = Counter[tuple[object, ...]]()
-        named = dict[tuple[object, ...], ConnectionEvent]()
-        for one in changes:
-            event = (one.kind, one.initiator, one.responder, one.started) if self.lack.before else (one.id,)
-            name = (*event, one.state)
-            named[*name, told[name]] = one
-            told[name] += 1
-        return named
-
-    def _is_one(self, one: ConnectionEvent | None, other: ConnectionEvent | None) -> bool:
-        if self.lack.before and one is not None and other is not None:
-            return structs.replace(one, id="") == structs.replace(other, id="")
-        return one == other
 
 
 def again(
@@ -126,98 +118,88 @@ def again(
     The realizer runs on an event loop, so nobody may ask for it on another one.
     Raises InputRefused: there is no such setting, or this Engage does not know those that the service had.
     """
-    lives: dict[tuple[str, str], Again] = {}
-    live: dict[str, list[ConnectionEvent]] = {}
-    numbers, configs = _numbers(recording), _configurations(recording)
     meant = {line.partition(".")[0] for line in settings} or {*services}
-    ledgers: dict[str, list[Taken]] = {}
-
-    def find(life: str, number: int) -> Received | None:
-        place = numbers.get((life, number & 0xFFFFFFFF))
-        return None if place is None else recording.received(place)
-
+    configs = _configurations(recording)
+    ledgers: dict[tuple[str, str], list[Taken]] = {}
+    places: dict[tuple[str, int], int] = {}
+    """Places of the ordered events and states, by life and number."""
     for place in range(len(recording)):
         key = recording.key(place)
-        if not keys.matches(keys.ANY_TAKEN, key) and not keys.matches(keys.ANY_CONNECTION_EVENT, key):
+        if not key or keys.key_class(key) not in ("evt", "state"):
             continue
-        message = getattr(recording.received(place), "message", None)
-        if isinstance(message, ConnectionEvent):
-            live.setdefault(message.session, []).append(message)
-        elif isinstance(message, Taken) and message.service in meant and message.service in SERVICES:
-            name = (message.service, message.session)
-            if name not in lives:
-                lives[name] = _begun(recording.robot, message, configs.get(name), settings)
-            lives[name].take(message, find)
-        elif isinstance(message, Taken) and message.service == "realizer" and message.service in meant:
-            ledgers.setdefault(message.session, []).append(message)
-    realizers = [_realizer(recording, ledger, configs, settings, find) for ledger in ledgers.values()]
-    return realizers + [
-        Compared(
-            service=service, session=session, steps=life.steps, differences=tuple(life.differences), lack=life.lack,
-            live=tuple(live.get(session, ())) if service == "recognition" else (), again=tuple(_events(life.outputs)),
+        if number := recording.number(place):
+            places[recording.life(place), number] = place
+        if keys.matches(keys.ANY_TAKEN, key):
+            taken = getattr(recording.received(place), "message", None)
+            if isinstance(taken, Taken) and taken.service in meant & CONFIGS.keys():
+                ledgers.setdefault((taken.service, taken.session), []).append(taken)
+
+    def find(life: str, number: int) -> Received | None:
+        place = places.get((life, number & 0xFFFFFFFF))
+        return None if place is None else recording.received(place)
+
+    found = []
+    for (service, session), ledger in ledgers.items():
+        had = configs.get((service, session))
+        config, lack = _config(service, had, settings), Lack(settings=had is None)
+        clock = StepClock(ledger[0].at.clock)
+        if service == "realizer":
+            assert isinstance(config, RealizerConfig)
+            found.append(_realizer(recording, ledger, clock, lack, config, find))
+            continue
+        row = SERVICES[service]
+        life = Again(row.make(recording.robot, config, clock, session), clock, row.content, lack)
+        said = [sent for taken in ledger for sent in _events(life.take(taken, find), taken.at.seconds)]
+        live = _said(recording, session, keys.ANY_CONNECTION_EVENT) if service == "recognition" else ()
+        compared = Compared(
+            service=service, session=session, steps=life.steps, lack=life.lack, differences=tuple(life.differences)
         )
-        for (service, session), life in lives.items()
-    ]  # fmt: skip
+        found.append(_with_words(compared, live, said, near=0.0))
+    return found
 
 
 def _realizer(
     recording: Recording,
     ledger: Sequence[Taken],
-    configs: Mapping[tuple[str, str], Struct],
-    settings: Sequence[str],
-    find: Find,
+    clock: StepClock,
+    lack: Lack,
+    config: RealizerConfig,
+    find: Callable[[str, int], Received | None],
 ) -> Compared:
     """One life of the realizer, live and again. If its first steps are missing, it is not played."""
     first, steps = ledger[0], [step for taken in ledger for step in taken.steps]
-    before, gaps = first.first - 1, ledger[-1].first + len(ledger[-1].steps) - first.first - len(steps)
-    had = configs.get(("realizer", first.session))
-    lack = Lack(settings=had is None, before=before, gaps=gaps)
-    if before:
-        return Compared(service="realizer", session=first.session, steps=0, differences=(), lack=lack)
-    config = _config("realizer", had, settings)
-    assert isinstance(config, RealizerConfig)
-    live = [*_said(recording, first.session)]
-    run = next(
-        (life for place in range(len(recording)) if (life := recording.life(place)).startswith(first.session)), ""
+    lack = replace(
+        lack, before=first.first - 1, gaps=ledger[-1].first + len(ledger[-1].steps) - first.first - len(steps)
     )
-    said, missing = played(recording.robot, run, steps, StepClock(first.at.clock), find, config)
-    differ, furthest = compared(live, said, steps[-1].now)
-    return Compared(
-        service="realizer", session=first.session, steps=len(steps), differences=(),
-        lack=structs.replace(lack, messages=missing), other_words=tuple(differ), furthest=furthest,
-    )  # fmt: skip
+    if lack.before:
+        return Compared(service=first.service, session=first.session, steps=0, lack=lack)
+    runs = (recording.life(place) for place in range(len(recording)))
+    run = next((run for run in runs if session_of(run) == first.session), "")
+    said, missing = played(recording.robot, run, steps, clock, find, config)
+    compared = Compared(
+        service=first.service, session=first.session, steps=len(steps), lack=replace(lack, messages=missing)
+    )
+    # What came last may be missing live: the recording may have ended before.
+    return _with_words(compared, _said(recording, first.session), said, near=NEAR, until=steps[-1].now)
 
 
-def _said(recording: Recording, session: str) -> Iterable[SentMessage]:
+def _said(recording: Recording, session: str, pattern: str = keys.EVERYTHING) -> Iterator[SentMessage]:
     """Messages that a life published, as the recording has them."""
     for place in range(len(recording)):
-        if session_of(recording.life(place)) == session:
-            received = recording.received(place)
-            if received is not None:
-                yield SentMessage(received.key, received.message, received.at)
+        if session_of(recording.life(place)) != session or not keys.matches(pattern, recording.key(place)):
+            continue
+        if (received := recording.received(place)) is not None:
+            yield SentMessage(received.key, received.message, received.at)
 
 
-def _begun(robot: str, first: Taken, had: Struct | None, settings: Sequence[str]) -> Again:
-    """The life of a service that begins with these steps."""
-    service = SERVICES[first.service]
-    config = _config(first.service, had, settings)
-    clock = StepClock(first.at.clock)
-    return Again(
-        service.make(robot, config, clock, first.session), clock, service.content, Lack(settings=had is None)
-    )
-
-
-def _config(service: str, had: Struct | None, settings: Sequence[str]) -> Struct:
-    """The configuration that a service had, else that by default; with those of the settings that are its own."""
-    config = had or CONFIGS[service]()
-    own = [line for line in settings if line.startswith(f"{service}.")]
-    return with_settings(service, config, own) if own else config
-
-
-def _events(outputs: Iterable[Struct]) -> Iterable[ConnectionEvent]:
+def _events(outputs: Iterable[Struct], at: Seconds) -> Iterator[SentMessage]:
+    """Connection events among what a service gives back."""
     for output in outputs:
         if isinstance(output, PublishMessage) and isinstance(output.message, ConnectionEvent):
-            yield output.message
+            yield SentMessage(output.key, output.message, at)
+
+
+# -- configurations ---------------------------------------------------------------------------------------------
 
 
 def _configurations(recording: Recording) -> dict[tuple[str, str], Struct]:
@@ -238,23 +220,93 @@ def _configurations(recording: Recording) -> dict[tuple[str, str], Struct]:
     return found
 
 
-def _numbers(recording: Recording) -> dict[tuple[str, int], int]:
-    """Places of the ordered events and states, by life and number."""
-    found = {}
-    for place in range(len(recording)):
-        key = recording.key(place)
-        if key and keys.key_class(key) in ("evt", "state"):
-            life, number = recording.life(place), recording.number(place)
-            if number:
-                found[life, number] = place
-    return found
+def _config(service: str, had: Struct | None, settings: Sequence[str]) -> Struct:
+    """The configuration that a service had, else that by default; with those of the settings that are its own.
 
-
-def with_settings(service: str, config: Struct, settings: Sequence[str]) -> Struct:
-    """The same with other settings, `SERVICE.KEY=VALUE`. Raises InputRefused."""
-    had = [f"{key}={value}" for key, value in flat(msgspec.to_builtins(config), f"{service}.") if value]
-    changed: Struct = getattr(read(RobotConfig, settings=settings, defaults=had), service)
+    Raises InputRefused.
+    """
+    config = had or CONFIGS[service]()
+    own = [line for line in settings if line.startswith(f"{service}.")]
+    if not own:
+        return config
+    before = [f"{key}={value}" for key, value in flat(msgspec.to_builtins(config), f"{service}.") if value]
+    changed: Struct = getattr(read(RobotConfig, settings=own, defaults=before), service)
     return changed
+
+
+# -- comparison -------------------------------------------------------------------------------------------------
+
+
+def _with_words(
+    life: Compared, live: Iterable[SentMessage], again: Iterable[SentMessage], near: Seconds, until: Seconds = inf
+) -> Compared:
+    """Add the messages, those that differ, in order, and the greatest difference of times of the others.
+
+    near: difference of times that counts as none. until: instant from which on nothing counts.
+    """
+    live, again = tuple(live), tuple(again)
+    before, now = _named(live), _named(again)
+    differ, furthest = [], 0.0
+    for name in before | now:
+        one, other = before.get(name), now.get(name)
+        off = inf if one is None or other is None else distance(_plain(one.message), _plain(other.message))
+        if off <= near:
+            furthest = max(furthest, off)
+        elif min(each.at for each in (one, other) if each is not None) < until:
+            differ.append(OtherWords(one, other))
+    return replace(life, live=live, again=again, other_words=tuple(differ), furthest=furthest)
+
+
+def _named(said: Iterable[SentMessage]) -> dict[tuple[object, ...], SentMessage]:
+    """Messages by what they are about, and how often that was told before.
+
+    Left out is what comes with the clock: renewals, predictions, and another pace for a behavior that may go on as
+    far as before. Connection events are known by what they are: if the first steps are missing, or settings are
+    others, they are numbered otherwise again.
+    """
+    told, named = Counter[tuple[object, ...]](), dict[tuple[object, ...], SentMessage]()
+    for each in said:
+        message = each.message
+        if isinstance(message, KeepAlive | PredictionFeedback | Taken) or keys.key_class(each.key) not in (
+            "evt",
+            "cmd",
+        ):
+            continue
+        if isinstance(message, ConnectionEvent):
+            about = ["kind", "initiator", "responder", "started"]
+        else:
+            about = ["id", "block", "behavior", "sync", "event", "through", "held"]
+        name = (each.key, type(message).__name__, *(str(getattr(message, field, None)) for field in about))
+        if not (isinstance(message, PerformBehavior) and told[name]):
+            named[*name, told[name]] = each
+        told[name] += 1
+    return named
+
+
+def _plain(message: Message) -> Any:
+    """The message as plain values, without what is no deed: expectations, and numbers of updates and events."""
+    match message:
+        case SyncPointProgress():
+            message = replace(message, predicted=None)
+        case PerformBehavior():
+            message = replace(message, pace=(), revision=0)
+        case ConnectionEvent():
+            message = replace(message, id="")
+    return msgspec.to_builtins(message)
+
+
+def distance(one: Any, other: Any) -> float:
+    """Greatest difference of two numbers at the same place; inf: they differ in anything else."""
+    match one, other:
+        case ((bool() | str() | None), _):
+            return 0.0 if one == other else inf
+        case ((int() | float()), (int() | float())):
+            return abs(one - other)
+        case dict(), dict() if one.keys() == other.keys():
+            return max((distance(one[key], other[key]) for key in one), default=0.0)
+        case ((list() | tuple()), (list() | tuple())) if len(one) == len(other):
+            return max(map(distance, one, other), default=0.0)
+    return inf
 
 
 # -- in words ---------------------------------------------------------------------------------------------------
@@ -278,66 +330,43 @@ def play_again(paths: Sequence[Path], settings: Sequence[str], console: Console)
 
 def told(life: Compared, name: str, *, has_other_settings: bool) -> list[str]:
     """Lines about one life of a service, live and again."""
-    events = f", {len({one.id for one in life.live})} events, {len(life.live)} changes" if life.live else ""
-    head = f"{name}, {life.service}, life {life.session}: {life.steps} steps{events}"
-    lines, lack = [], life.lack
+    lack = life.lack
+    if life.other_words:
+        came = f"{'with other settings' if has_other_settings else 'again'} {len(life.other_words)} messages differ"
+    elif lack.before and not life.steps:
+        came = "it is played from its beginning on alone"
+    elif life.differences and not life.live:
+        came = f"{len(life.differences)} led to something else"
+    else:
+        came = f"again the same, {_how_near(life)}"
+    lines = [f"{name}, {life.service}, life {life.session}: {life.steps} steps; {came}"]
     if lack.settings:
         lines.append(f"  the settings of {life.service} are missing or cannot be read: again it has those by default")
     if lack.before:
         lines.append(f"  {lack.before} steps are from before the recording: what had begun by then is not known")
     if lack.gaps or lack.messages:
         lines.append(f"  {lack.gaps} steps and {lack.messages} messages that it took are missing in the recording")
-    if life.service == "realizer":
-        return [head + _realizer_words(life), *lines, *_word_lines(life.other_words)]
-    if life.is_same and not has_other_settings:
-        return [f"{head}: again the same, to the last bit", *lines]
-    if life.live or life.again:
-        events_lines, number = _event_lines(life)
-        if not number and lack.before:
-            return [f"{head}: again the same, but for the numbers of the events", *lines]
-        why = "with other settings" if has_other_settings else "again"
-        return [f"{head}; {why} {number} differ", *lines, *events_lines]
-    return [f"{head}; {len(life.differences)} led to something else", *lines, *_step_lines(life.differences)]
-
-
-def _event_lines(life: Compared) -> tuple[list[str], int]:
-    """Lines about the events that differ, and their number."""
-    different = life.changed_events()
-    lines = [f"  live:  {_counts(life.live)}", f"  again: {_counts(life.again)}"]
-    for was, now in different[:SHOWN]:
-        one = was or now
-        assert one is not None
-        lines.append(f"  {one.id} {one.kind} {one.state}: {_delay(was)}, again {_delay(now)}")
-    if len(different) > SHOWN:
-        lines.append(f"  and {len(different) - SHOWN} more")
-    return lines, len(different)
-
-
-def _realizer_words(life: Compared) -> str:
-    if life.lack.before:
-        return ": it is played from its beginning on alone"
-    if life.other_words:
-        return f"; {len(life.other_words)} messages differ"
-    return ": again the same" + (
-        f", at times within {1000 * life.furthest:.1f} ms" if life.furthest else ", to the last bit"
-    )
-
-
-def _word_lines(differences: Sequence[OtherWords]) -> Iterable[str]:
-    """Lines about the first messages of the realizer that differ."""
-    for one in differences[:SHOWN]:
-        said = one.live or one.again
+    if life.service == "recognition" and life.other_words:
+        lines += [f"  live:  {_counts(life.live)}", f"  again: {_counts(life.again)}"]
+    if not has_other_settings and life.differences:  # all that follows may come of the first
+        one = life.differences[0]
+        did = ", ".join(map(str, one.outputs)) or "nothing"
+        lines.append(
+            f"  first step {one.number}, at {one.step.now:.3f} s, which took {_input(one.step)}: again {did}"
+        )
+    for words in life.other_words[:SHOWN]:
+        said = words.live or words.again
         assert said is not None
-        yield f"  at {said.at:.3f} s, {type(said.message).__name__} on {said.key}"
-        yield f"    live:  {one.live.message if one.live else 'nothing'}"
-        yield f"    again: {one.again.message if one.again else 'nothing'}"
+        lines.append(f"  at {said.at:.3f} s, {type(said.message).__name__} on {said.key}")
+        lines.append(f"    live:  {words.live.message if words.live else 'nothing'}")
+        lines.append(f"    again: {words.again.message if words.again else 'nothing'}")
+    return lines
 
 
-def _step_lines(differences: Sequence[StepDifference]) -> Iterable[str]:
-    """Line about the first step that led to something else: all that follows may come of it."""
-    for one in differences[:1]:
-        did = ", ".join(str(output) for output in one.outputs) or "nothing"
-        yield f"  first step {one.number}, at {one.step.now:.3f} s, which took {_input(one.step)}: again {did}"
+def _how_near(life: Compared) -> str:
+    if life.differences:
+        return "but for the numbers of the events"
+    return f"at times within {1000 * life.furthest:.1f} ms" if life.furthest else "to the last bit"
 
 
 def _input(step: Step) -> str:
@@ -346,12 +375,6 @@ def _input(step: Step) -> str:
     return f"message {step.number} of {step.life}" if step.number else "what was due"
 
 
-def _counts(events: Sequence[ConnectionEvent]) -> str:
-    states = Counter(one.state for one in events)
+def _counts(said: Sequence[SentMessage]) -> str:
+    states = Counter(getattr(each.message, "state", "") for each in said)
     return ", ".join(f"{count} {state}" for state, count in sorted(states.items())) or "none"
-
-
-def _delay(event: ConnectionEvent | None) -> str:
-    if event is None:
-        return "not there"
-    return "there" if event.delay is None else f"{event.delay:.6f} s"

@@ -15,12 +15,11 @@ from engage_hri.services.commandline.shell.process import DONE
 from engage_hri.services.commandline.shell.recording_file import opened
 from engage_hri.services.commandline.shell.roster import widest
 from engage_hri.services.commandline.study.again import play_again
-from engage_hri.services.commandline.study.recorded_sessions import Session, sessions
+from engage_hri.services.commandline.study.recorded_sessions import UNNAMED, Session, sessions
 from engage_hri.services.commandline.study.tables import StudyReport
-from engage_hri.services.recording.conditions import UNNAMED
 from engage_hri.services.recording.settings import COLUMNS, changed, flat, rows
 from engage_hri.services.runtime.settings import shown
-from engage_hri.services.study import files, summary
+from engage_hri.services.study import summary
 from engage_hri.services.study.conditions import BASELINE
 from engage_hri.services.study.hypotheses import HypothesisResult, findings
 from engage_hri.services.study.summary import BETWEEN, WITHIN, NumberTable
@@ -172,7 +171,7 @@ def configured(sessions: Sequence[Session]) -> NumberTable:
 def settings(sessions: Sequence[Session]) -> str:
     """CSV of all settings of all services of all recordings."""
     found = ((one.record.session, one.condition, *row) for one in sessions for row in rows(one.settings))
-    return files.table(("session", "condition", *COLUMNS), found)
+    return summary.csv_table(("session", "condition", *COLUMNS), found)
 
 
 def listed(sessions: Sequence[Session]) -> str:
@@ -180,4 +179,4 @@ def listed(sessions: Sequence[Session]) -> str:
     found = (
         (one.record.session, one.condition, one.path.name, one.participant, "; ".join(one.doubts)) for one in sessions
     )
-    return files.table(("session", "condition", "file", "participant", "doubts"), found)
+    return summary.csv_table(("session", "condition", "file", "participant", "doubts"), found)

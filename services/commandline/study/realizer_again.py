@@ -9,35 +9,28 @@ between, and a command that is void at once may have been sent or not.
 """
 
 import asyncio
-from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from functools import partial
-from math import inf
-from typing import Any
 
-import msgspec
 from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.blocks import PredictionFeedback, SyncPointProgress
-from engage_hri.schemas.body import EstimateBehaviors, PerformBehavior
+from engage_hri.schemas.body import EstimateBehaviors
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.messages import Message, in_form
 from engage_hri.schemas.participants import BusHealth, Step
-from engage_hri.schemas.requests import KeepAlive
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Answer, Bus, Subscription, Tap
 from engage_hri.services.bus.samples import Received
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.inputs import BodyAnswered, RealizerInput, behaviors_asked
 from engage_hri.services.realizer.service import realize
+from engage_hri.services.realizer.together.planning import BodyAnswered, RealizerInput, behaviors_asked
 from engage_hri.services.runtime.again import Find, content_of
-from engage_hri.services.runtime.ledger import StepClock
+from engage_hri.services.runtime.intake import StepClock
 from engage_hri.services.runtime.virtual_time import run_virtual
 
-NEAR: Seconds = 0.05
-"""Greatest difference of times that count as the same: a loop that is so late has stood still (`bus/sight.py`)."""
 TURNS = 40
 """Turns of the loop from one input to the next of the same instant: what follows from the first comes before."""
 AFTER: Seconds = 0.01
@@ -50,13 +43,6 @@ class SentMessage(Struct, frozen=True):
     key: str
     message: Message
     at: Seconds
-
-
-class OtherWords(Struct, frozen=True):
-    """A message that only one side has, or that says something else. None: that side has none."""
-
-    live: SentMessage | None
-    again: SentMessage | None
 
 
 class PlayedBus(Bus):
@@ -181,70 +167,3 @@ def played(
         return bus.said, missing
 
     return run_virtual(play(), begin=steps[0].now)
-
-
-# -- comparison -------------------------------------------------------------------------------------------------
-
-
-def compared(
-    live: Iterable[SentMessage], again: Iterable[SentMessage], until: Seconds
-) -> tuple[list[OtherWords], Seconds]:
-    """Messages that differ, in order, and the greatest difference of times of the others.
-
-    until: instant from which on nothing counts: the recording may have ended in between.
-    """
-    before, now = _named(live), _named(again)
-    differ, furthest = [], 0.0
-    for name in [*before, *(name for name in now if name not in before)]:
-        one, other = before.get(name), now.get(name)
-        off = inf if one is None or other is None else distance(_plain(one.message), _plain(other.message))
-        if off <= NEAR:
-            furthest = max(furthest, off)
-        elif min(each.at for each in (one, other) if each is not None) < until:
-            differ.append(OtherWords(one, other))
-    return differ, furthest
-
-
-def _named(said: Iterable[SentMessage]) -> Mapping[tuple[object, ...], SentMessage]:
-    """Messages by what they are about, and how often that was told before.
-
-    Left out is what comes with the clock: renewals, predictions, and another pace for a behavior that may go on as
-    far as before.
-    """
-    told, named = Counter[tuple[object, ...]](), dict[tuple[object, ...], SentMessage]()
-    for each in said:
-        message = each.message
-        if isinstance(message, KeepAlive | PredictionFeedback) or keys.key_class(each.key) not in ("evt", "cmd"):
-            continue
-        if keys.matches(keys.ANY_TAKEN, each.key):
-            continue
-        about = [getattr(message, name, None) for name in ("id", "block", "behavior", "sync", "event", "through")]
-        name = (each.key, type(message).__name__, *map(str, about), getattr(message, "held", None))
-        if not (isinstance(message, PerformBehavior) and told[name]):
-            named[*name, told[name]] = each
-        told[name] += 1
-    return named
-
-
-def _plain(message: Message) -> Any:
-    """The message as plain values, without what is no deed: expectations, and numbers of updates."""
-    match message:
-        case SyncPointProgress():
-            message = replace(message, predicted=None)
-        case PerformBehavior():
-            message = replace(message, pace=(), revision=0)
-    return msgspec.to_builtins(message)
-
-
-def distance(one: Any, other: Any) -> float:
-    """Greatest difference of two numbers at the same place; inf: they differ in anything else."""
-    match one, other:
-        case ((bool() | str() | None), _):
-            return 0.0 if one == other else inf
-        case ((int() | float()), (int() | float())):
-            return abs(one - other)
-        case dict(), dict() if one.keys() == other.keys():
-            return max((distance(one[key], other[key]) for key in one), default=0.0)
-        case ((list() | tuple()), (list() | tuple())) if len(one) == len(other):
-            return max(map(distance, one, other), default=0.0)
-    return inf

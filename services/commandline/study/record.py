@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -18,9 +18,6 @@ from engage_hri.services.commandline.shell.process import DONE, FAILED, run_unti
 from engage_hri.services.commandline.shell.recording_file import needed, recording
 from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.runtime.service import installed_version
-
-if TYPE_CHECKING:
-    pass
 
 GIVES_WAY = 10
 """Niceness of the recorder: where processors are few the robot goes first, and messages wait in front of it."""

@@ -20,9 +20,8 @@ from engage_hri.services.commandline.shell.options import Configured, Quiet, Res
 from engage_hri.services.commandline.shell.outputs import Terminal
 from engage_hri.services.commandline.shell.process import DONE, FAILED, interrupted, run
 from engage_hri.services.commandline.shell.settings import TRANSCRIPT
-from engage_hri.services.commandline.study.session import Order, SessionResult
+from engage_hri.services.commandline.study.session import Order, SessionResult, play_all
 from engage_hri.services.commandline.study.tables import StudyReport, session_line
-from engage_hri.services.commandline.study.workers import play_all
 from engage_hri.services.runtime.service import installed_version
 from engage_hri.services.study import summary
 from engage_hri.services.study.conditions import CONDITIONS, DEGRADATIONS

@@ -1,5 +1,6 @@
 """Tables and plots of a study, for a terminal and for files."""
 
+import os
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 
@@ -8,10 +9,9 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.services.commandline.shell.result_folder import Folder
+from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.services.runtime.installation import extra_command
-from engage_hri.services.study import files
+from engage_hri.services.study import summary
 from engage_hri.services.study.hypotheses import HypothesisResult
 from engage_hri.services.study.records import EventRecord, SessionRecord
 from engage_hri.services.study.summary import NumberTable
@@ -19,6 +19,42 @@ from engage_hri.services.study.summary import NumberTable
 PLOTS = ("events.png", "delays.png", "failure_rates.png", "mtbce.png", "completion_time.png")
 FILES = ("events.csv", "sessions.csv", "hypotheses.csv", "summary.md", *PLOTS)
 Draw = Callable[[Sequence[SessionRecord], Sequence[EventRecord]], dict[str, bytes]]
+
+
+class Folder:
+    """Directory for results. names: of all files that may be written. overwrite: old ones are replaced or removed.
+
+    Raises InputRefused if the directory cannot be written to, or, without `overwrite`, holds one of the files.
+    """
+
+    def __init__(self, path: Path, names: Collection[str], *, overwrite: bool) -> None:
+        self.path = path
+        self._names = names
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputRefused(Fault(reason=f"cannot be made: {error.strerror}", where=str(path))) from error
+        if not os.access(path, os.W_OK | os.X_OK):
+            raise InputRefused(Fault(reason="cannot be written to", where=str(path)))
+        present = [name for name in names if (path / name).exists()]
+        if present and not overwrite:
+            raise InputRefused(
+                Fault(reason=f"has results already: {', '.join(present)}", where=str(path), advice="add --overwrite")
+            )
+
+    def write(self, files: dict[str, bytes]) -> None:
+        """Write these files, and remove the others of `names`. Raises RunFailed."""
+        for name in self._names:
+            try:
+                if name in files:
+                    part = self.path / f".{name}.part"
+                    part.write_bytes(files[name])
+                    part.replace(self.path / name)
+                else:
+                    (self.path / name).unlink(missing_ok=True)
+            except OSError as error:
+                fault = Fault(reason=f"cannot write: {error.strerror}", where=str(self.path / name))
+                raise RunFailed(fault) from error
 
 
 class StudyReport:
@@ -49,9 +85,9 @@ class StudyReport:
         if self._folder is None:
             return
         texts = {
-            **more, "events.csv": files.events(events), "sessions.csv": files.sessions(records),
+            **more, "events.csv": summary.events_csv(events), "sessions.csv": summary.sessions_csv(records),
             "summary.md": "\n".join(table.markdown() for table in tables),
-            **({"hypotheses.csv": files.findings(found)} if found else {}),
+            **({"hypotheses.csv": summary.findings_csv(found)} if found else {}),
         }  # fmt: skip
         written = {name: text.encode() for name, text in texts.items()}
         self._folder.write(written | self._draw(records, events))

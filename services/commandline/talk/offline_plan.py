@@ -36,10 +36,10 @@ async def _generated(things: Sequence[Thing], world: World, config: RobotConfig,
     from engage_hri.services.control.bases.drivers import made
     from engage_hri.services.control.contract.calibration import calibrated
     from engage_hri.services.generation.fragment_check import performable
-    from engage_hri.services.generation.head.inhibitions import Leases
+    from engage_hri.services.generation.inhibitions import Leases
     from engage_hri.services.generation.pipeline import glance, planned, planning, targets
-    from engage_hri.services.generation.references.discourse import NO_DISCOURSE
     from engage_hri.services.generation.references.motions import distinct, from_here, from_here_told
+    from engage_hri.services.generation.references.phrases import NO_DISCOURSE
     from engage_hri.services.generation.references.policy import Unreferable
     from engage_hri.services.generation.turns.policy import TurnPolicy
 
@@ -79,7 +79,7 @@ async def _generated(things: Sequence[Thing], world: World, config: RobotConfig,
                 ),
                 estimated,
             )
-            discourse = discourse.naming(fragment.id, [mention.object for mention in emitted.mentions])
+            discourse = discourse.naming(fragment.id, [each.object for each in emitted.made])
             plans.append(replace(emitted, warnings=(*lost, *emitted.warnings)))
         except Unreferable as error:
             where = f"{source}: {fragment.id}: {error.fault.where}"

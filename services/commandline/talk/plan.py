@@ -13,15 +13,13 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.world import World
 from engage_hri.services.commandline.embedding import in_memory
 from engage_hri.services.commandline.shell import roster
-from engage_hri.services.commandline.shell.exit_codes import readable
 from engage_hri.services.commandline.shell.failing_output import print_format
-from engage_hri.services.commandline.shell.options import Embodied, Strict, WorldFile
+from engage_hri.services.commandline.shell.options import Embodied, Strict, WorldFile, strict_refusal
 from engage_hri.services.commandline.shell.outputs import Terminal
-from engage_hri.services.commandline.shell.process import DONE, FAILED
+from engage_hri.services.commandline.shell.process import DONE, FAILED, readable
 from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.commandline.shell.sources import read_source, read_world, still
 from engage_hri.services.commandline.talk.offline_plan import generated
-from engage_hri.services.commandline.talk.prose import strict_refusal
 from engage_hri.services.commandline.talk.references import show_references
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.relations import NO_SUCH_BLOCK
@@ -46,7 +44,7 @@ class Options(Embodied):
 
 def main(options: Options) -> int:
     from engage_hri.services.realizer import export
-    from engage_hri.services.realizer.report.outcome import nothing_is_left
+    from engage_hri.services.realizer.report import nothing_is_left
 
     config = options.load()
     source = read_source(options.file)

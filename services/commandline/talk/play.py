@@ -1,37 +1,41 @@
 """Command `engage play FILE...`: perform fragments and blocks, in a running system or in a private one."""
 
 import asyncio
-from collections.abc import Callable, Sequence
-from contextlib import AbstractAsyncContextManager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal
 
 import typer
-from rich.console import Console
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.blocks import Block, BlockOutcome
+from engage_hri.schemas.blocks import Block, BlockOutcome, WarningFeedback, WarningKind
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused, NoReply, RunFailed
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.participants import AskStatus
+from engage_hri.schemas.references import SyncRef, sites
 from engage_hri.schemas.units import A_DAY, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Hub
 from engage_hri.services.client.language_models import summary_of
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline.embedding import in_memory, services
-from engage_hri.services.commandline.shell.exit_codes import readable
 from engage_hri.services.commandline.shell.failing_output import complain
-from engage_hri.services.commandline.shell.options import Connected, Embodied, Strict, VirtualTime, WorldFile, Written
+from engage_hri.services.commandline.shell.options import (
+    Connected,
+    Embodied,
+    Strict,
+    VirtualTime,
+    WorldFile,
+    Written,
+    strict_refusal,
+)
 from engage_hri.services.commandline.shell.outputs import Outputs, Terminal
-from engage_hri.services.commandline.shell.process import DONE, FAILED, REFUSED, run, unique_name
+from engage_hri.services.commandline.shell.process import DONE, FAILED, REFUSED, readable, run, unique_name
 from engage_hri.services.commandline.shell.settings import RobotConfig
-from engage_hri.services.commandline.shell.sources import InputFile, Thing, read_world, still
-from engage_hri.services.commandline.talk import input_check
-from engage_hri.services.commandline.talk.play_state import Played
-from engage_hri.services.commandline.talk.prose import Prose, Warnings, strict_refusal
+from engage_hri.services.commandline.shell.sources import InputFile, Thing, read_source, read_world, still
+from engage_hri.services.commandline.talk.played import Played, Prose, Warnings
 from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.console.terminal.live import Log
 from engage_hri.services.console.terminal.log import Telling
@@ -72,35 +76,6 @@ class Options(Written, Embodied, Connected):
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print each sync point, too.")] = False
 
 
-class Job(NamedTuple):
-    """Sources with all that is needed to perform them.
-
-    times: when to submit each source, seconds from the start; None: one after the other.
-    """
-
-    options: Options
-    sources: tuple[InputFile, ...]
-    times: tuple[Seconds, ...] | None
-    played: Played
-    outputs: Outputs
-    console: Console
-    prose: Prose
-    warnings: Warnings
-
-    @property
-    def servers(self) -> frozenset[str]:
-        """Services that perform the sources."""
-        return frozenset("generation" if isinstance(thing, TurnFragment) else "realizer" for thing in self.things)
-
-    @property
-    def things(self) -> list[Thing]:
-        return [thing for source in self.sources for thing in source.things]
-
-    @property
-    def has_fragments(self) -> bool:
-        return "generation" in self.servers
-
-
 def main(options: Options) -> int:
     private = {
         "--body": options.body,
@@ -109,7 +84,6 @@ def main(options: Options) -> int:
         "--human": options.human,
         "--virtual-time": options.virtual_time,
     }
-
     for option, given in private.items():
         if given and not options.embedded:
             raise InputRefused(Fault(reason=f"{option} is for a private system", advice="add --embedded"))
@@ -119,18 +93,13 @@ def main(options: Options) -> int:
     times = submission_times(options.at, len(options.files))
     with Outputs(options.events, options.feedback, options.outcomes) as outputs:
         world = read_world(options.world)
-        sources = input_check.read_all(options.files, outputs)
-        input_check.check(sources, world if options.embedded else None, config.robot, outputs)
-        played = Played(thing for source in sources for thing in source.things)
-        outputs.wanted = played.concerns
-        console = outputs.console(quiet=options.quiet)
-        warnings = Warnings(Terminal(stderr=True))
-        prose = Prose(console, outputs, played.words_will_come)
-        job = Job(options, sources, times, played, outputs, console, prose, warnings)
-        performing = _embedded(job, config, world) if options.embedded else _remote(job, config)
+        sources = read_all(options.files, outputs)
+        check(sources, world if options.embedded else None, config.robot, outputs)
+        play = PlayedFiles(options, sources, times, outputs)
+        performing = play.embedded(config, world) if options.embedded else play.remote(config)
         code = run(performing, virtual_time=options.virtual_time)
-    if options.strict and warnings.count and code == DONE:
-        raise strict_refusal(warnings.count)
+    if options.strict and play.warnings.count and code == DONE:
+        raise strict_refusal(play.warnings.count)
     return code
 
 
@@ -150,35 +119,118 @@ def submission_times(text: str | None, files: int) -> tuple[Seconds, ...] | None
     return times
 
 
-def _private_system(job: Job, config: RobotConfig, world: World) -> AbstractAsyncContextManager[Hub]:
-    """Run a private system: simulated body and still world; generation only if there is a fragment.
+class PlayedFiles:
+    """Sources that are performed, with all that follows them. warnings: those of what is played.
 
-    So without a fragment only the blocks themselves move the head.
+    sources: files, in order. times: when to submit each, seconds from the start; None: one after the other.
     """
-    names = ["realizer", "recognition", "control"]
-    if job.has_fragments:
-        names.append("generation")
-    perception = still(world, is_attentive=job.options.human != "none")
-    return in_memory(config, {"simulation": perception, **services(config, *names)})
+
+    def __init__(
+        self, options: Options, sources: tuple[InputFile, ...], times: tuple[Seconds, ...] | None, outputs: Outputs
+    ) -> None:
+        self.warnings = Warnings(Terminal(stderr=True))
+        self._options = options
+        self._sources = sources
+        self._times = times
+        self._outputs = outputs
+        self._things = [thing for source in sources for thing in source.things]
+        self._played = Played(self._things)
+        outputs.wanted = self._played.concerns
+        self._console = outputs.console(quiet=options.quiet)
+        self._prose = Prose(self._console, outputs, self._played.words_will_come)
+
+    @property
+    def _servers(self) -> set[str]:
+        """Services that perform the sources."""
+        return {"generation" if isinstance(thing, TurnFragment) else "realizer" for thing in self._things}
+
+    async def embedded(self, config: RobotConfig, world: World) -> int:
+        """Perform all in a private system: simulated body and still world; generation only if there is a fragment.
+
+        So without a fragment only the blocks themselves move the head.
+        """
+        perception = still(world, is_attentive=self._options.human != "none")
+        names = {"realizer", "recognition", "control"} | self._servers
+        async with in_memory(config, {"simulation": perception, **services(config, *sorted(names))}) as hub:
+            return await self._perform_all(hub, None)
+
+    async def remote(self, config: RobotConfig) -> int:
+        """Perform all in a running system. Raises RunFailed: it is not there."""
+        async with await self._options.open(config.bus, "manager", patience=PATIENCE) as hub:
+            await _somebody_there(hub, self._servers, config)
+            async with connect(hub=hub) as robot:
+                world = await world_with_people(robot, self._things, config.robot, WORLD_PATIENCE)
+            if "generation" in self._servers:
+                # Without perception generation itself waits or refuses.
+                check(self._sources, world, config.robot, self._outputs)
+            return await self._perform_all(hub, PATIENCE)
+
+    async def _perform_all(self, hub: Hub, patience: Seconds | None) -> int:
+        """Perform all sources. Returns the worst exit code. patience: time in which a service must answer at all."""
+        bus = hub.join(unique_name("play-log"))
+        telling = Telling(head=False, points=self._options.verbose, warnings=False)
+        log = Log(self._console, hub.robot, bus.now(), telling)
+
+        def tell(message: Message, at: Seconds) -> None:
+            if self._played.concerns(message):
+                if deed := self._played.deed(message):
+                    log.say(f"{hub.robot} {deed}", at)
+                log(message, at)
+                self.warnings(message, at)
+                self._prose(message, at)
+
+        sinks: tuple[Sink, ...] = (self._played, tell, self._outputs)
+        async with following(bus, sinks, past=False), connect(hub=hub) as robot:
+
+            async def perform(source: InputFile, after: Seconds = 0.0) -> int:
+                await asyncio.sleep(after)
+                outcomes = [await self._perform(thing, source, robot, patience, log) for thing in source.things]
+                return max(outcomes)
+
+            if self._times is None:
+                code = max([await perform(source) for source in self._sources])
+            else:
+                async with asyncio.TaskGroup() as group:
+                    pairs = zip(self._sources, self._times, strict=True)
+                    tasks = [group.create_task(perform(*pair), name=str(pair[0].path)) for pair in pairs]
+                code = max(task.result() for task in tasks)
+            await self._played.settle()
+        self._prose.finish()
+        self.warnings.finish()
+        return code
+
+    async def _perform(
+        self, thing: Thing, source: InputFile, robot: Robot, patience: Seconds | None, log: Log
+    ) -> int:
+        """Perform a block or fragment of a file. Returns its exit code; a failure is told and ends nothing else."""
+        self.warnings.ask(thing.id)
+        outcome: FragmentOutcome | BlockOutcome
+        try:
+            if isinstance(thing, Block):
+                outcome = await robot.realize(thing, timeout=patience)
+            else:
+                outcome = await robot.perform(thing, timeout=patience)
+        except EngageError as error:
+            if isinstance(error, InputRefused):
+                self.warnings.refused(thing.id)
+            complain(readable(error.fault, source.path))
+            if isinstance(thing, TurnFragment):
+                self._outputs.outcome(thing.id, summary_of(error))
+            return REFUSED if isinstance(error, InputRefused) else FAILED
+        if isinstance(outcome, FragmentOutcome):
+            self._prose.expect(outcome)
+        elif outcome.dropped:
+            complain(f"{source.path}: {thing.id} was {outcome.status} without {', '.join(outcome.dropped)}")
+        if end := self._played.end_before_turn(outcome):
+            log.say(end, robot.now())
+        code = self._played.exit_code(outcome)
+        if code != DONE:
+            why = f": {outcome.fault.reason}" if outcome.fault is not None else ""
+            complain(f"{source.path}: {thing.id} was {outcome.status}{why}")
+        return code
 
 
-async def _embedded(job: Job, config: RobotConfig, world: World) -> int:
-    async with _private_system(job, config, world) as hub:
-        return await _perform_all(job, hub, None)
-
-
-async def _remote(job: Job, config: RobotConfig) -> int:
-    async with await job.options.open(config.bus, "manager", patience=PATIENCE) as hub:
-        await _somebody_there(hub, job.servers, config)
-        async with connect(hub=hub) as robot:
-            world = await world_with_people(robot, job.things, config.robot, WORLD_PATIENCE)
-        if job.has_fragments:
-            # Without perception generation itself waits or refuses.
-            input_check.check(job.sources, world, config.robot, job.outputs)
-        return await _perform_all(job, hub, PATIENCE)
-
-
-async def _somebody_there(hub: Hub, servers: frozenset[str], config: RobotConfig) -> None:
+async def _somebody_there(hub: Hub, servers: set[str], config: RobotConfig) -> None:
     """Wait for the servers, at most `PATIENCE` for all of them. Raises RunFailed for the first that is missing."""
     from engage_hri.services.bus.zenoh.neighbors import hinting
 
@@ -201,7 +253,7 @@ async def world_with_people(robot: Robot, things: Sequence[Thing], name: str, pa
     """
     deadline, world = robot.now() + patience, None
     with robot.worlds() as worlds:
-        while any(input_check.lacks_people(thing, world or NOTHING, name) for thing in things):
+        while any(lacks_people(thing, world or NOTHING, name) for thing in things):
             newer = await worlds.next(max(0.0, deadline - robot.now()))
             if newer is None:
                 break
@@ -209,80 +261,60 @@ async def world_with_people(robot: Robot, things: Sequence[Thing], name: str, pa
     return world
 
 
-async def _perform_all(job: Job, hub: Hub, patience: Seconds | None) -> int:
-    """Perform all sources. Returns the worst exit code. patience: time in which a service must answer at all."""
-    bus = hub.join(unique_name("play-log"))
-    log = Log(job.console, hub.robot, bus.now(), Telling(head=False, points=job.options.verbose, warnings=False))
-
-    def tell(message: Message, at: Seconds) -> None:
-        if job.played.concerns(message):
-            if deed := job.played.deed(message):
-                log.say(f"{hub.robot} {deed}", at)
-            log(message, at)
-            job.warnings(message, at)
-            job.prose(message, at)
-
-    sinks: tuple[Sink, ...] = (job.played, tell, job.outputs)
-    async with following(bus, sinks, past=False), connect(hub=hub) as robot:
-        code = await _perform_each(job, robot, patience, lambda line: log.say(line, bus.now()))
-        await job.played.settle()
-    job.prose.finish()
-    job.warnings.finish()
-    return code
-
-
-async def _perform_each(job: Job, robot: Robot, patience: Seconds | None, say: Callable[[str], None]) -> int:
-    if job.times is None:
-        return max([await _perform(job, source, robot, patience, say) for source in job.sources])
-    loop = asyncio.get_running_loop()
-    began = loop.time()
-
-    async def later(source: InputFile, time: Seconds) -> int:
-        await asyncio.sleep(began + time - loop.time())
-        return await _perform(job, source, robot, patience, say)
-
-    async with asyncio.TaskGroup() as group:
-        pairs = zip(job.sources, job.times, strict=True)
-        tasks = [group.create_task(later(source, time), name=str(source.path)) for source, time in pairs]
-    return max(task.result() for task in tasks)
-
-
-async def _perform(
-    job: Job, source: InputFile, robot: Robot, patience: Seconds | None, say: Callable[[str], None]
-) -> int:
-    """Perform the content of a file, in order. say: prints a line of the log.
-
-    Returns the worst exit code; a failure is told and ends nothing else.
-    """
-    worst = DONE
-    for thing in source.things:
-        job.warnings.ask(thing.id)
+def read_all(files: Sequence[Path], outputs: Outputs) -> tuple[InputFile, ...]:
+    """Read all files. Raises InputRefused for the first bad one, after its warning has gone to the feedback."""
+    sources = []
+    for path in files:
         try:
-            outcome = await _submit(thing, robot, patience)
-        except EngageError as error:
-            if isinstance(error, InputRefused):
-                job.warnings.refused(thing.id)
-            complain(readable(error.fault, source.path))
-            worst = max(worst, REFUSED if isinstance(error, InputRefused) else FAILED)
-            if isinstance(thing, TurnFragment):
-                job.outputs.outcome(thing.id, summary_of(error))
-            continue
-        if isinstance(outcome, FragmentOutcome):
-            job.prose.expect(outcome)
-        elif outcome.dropped:
-            left_out = ", ".join(outcome.dropped)
-            complain(f"{source.path}: {thing.id} was {outcome.status} without {left_out}")
-        if end := job.played.end_before_turn(outcome):
-            say(end)
-        code = job.played.exit_code(outcome)
-        if code != DONE:
-            why = f": {outcome.fault.reason}" if outcome.fault is not None else ""
-            complain(f"{source.path}: {thing.id} was {outcome.status}{why}")
-        worst = max(worst, code)
-    return worst
+            sources.append(read_source(path))
+        except InputRefused as error:
+            _warn(outputs, error.block, error.fault)
+            raise
+    return tuple(sources)
 
 
-async def _submit(thing: Thing, robot: Robot, patience: Seconds | None) -> FragmentOutcome | BlockOutcome:
-    if isinstance(thing, Block):
-        return await robot.realize(thing, timeout=patience)
-    return await robot.perform(thing, timeout=patience)
+def check(sources: Sequence[InputFile], world: World | None, robot: str, outputs: Outputs) -> None:
+    """Check blocks for contradictions, and fragments against a world, if it is known. Raises InputRefused."""
+    from engage_hri.services.generation.fragment_check import performable
+    from engage_hri.services.realizer.plan.known import Known
+    from engage_hri.services.realizer.plan.planner import plan_block
+    from engage_hri.services.realizer.plan.relations import BlockRefused
+
+    for source in sources:
+        for thing in source.things:
+            try:
+                with source.naming_file():
+                    if isinstance(thing, Block):
+                        # The realizer will check that the other blocks are alive when this one comes.
+                        plan_block(thing, known=Known(blocks=dict.fromkeys(_others(thing))))
+                    elif world is not None:
+                        performable(thing, world, robot)
+            except InputRefused as error:
+                refusal = error.__cause__
+                kind = refusal.kind if isinstance(refusal, BlockRefused) else "PARSING_FAILURE"
+                _warn(outputs, thing.id, error.fault, kind)
+                raise
+
+
+def lacks_people(thing: Thing, world: World, robot: str) -> bool:
+    """True if a fragment or block speaks to somebody, or has a target that is not known, and the world has no people.
+
+    robot: its actor id, which may be a target.
+    """
+    from engage_hri.services.generation import fragment_check
+
+    if world.people:
+        return False
+    known = {robot, "", *(entity.id for entity in world.entities)}
+    if any(getattr(behavior, "target", "") not in known for behavior in thing.behaviors):
+        return True
+    return isinstance(thing, TurnFragment) and fragment_check.lacks_people(thing, world)
+
+
+def _others(block: Block) -> set[str]:
+    """Ids of the other blocks to whose points a block refers."""
+    return {SyncRef.parse(site.text).block for site in sites(block)} - {"", block.id}
+
+
+def _warn(outputs: Outputs, block: str | None, fault: Fault, kind: WarningKind = "PARSING_FAILURE") -> None:
+    outputs(WarningFeedback(block=block, kind=kind, message=readable(fault)), 0.0)

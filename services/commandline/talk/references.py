@@ -1,7 +1,7 @@
 """Reasons of each reference for `engage plan --why`: all gestures with all phrases, and why one is chosen."""
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import msgspec
 from msgspec.structs import asdict
@@ -25,8 +25,7 @@ GESTURES: dict[GestureChoice, str] = {
 }  # fmt: skip
 WIDE = 110
 """Width of the terminal, in columns, from which distractors are named and not only counted."""
-WRAPPED = 12
-"""Least width of a column whose cells are wrapped."""
+NUMBERS = ("r", "R", "Rmin", "cost")
 NAMED = 4
 """Distractors named in a row; the rest is counted."""
 
@@ -81,26 +80,15 @@ def show(plans: Sequence[FragmentPlan], console: Console) -> None:
 
 def show_tables(choices: Sequence[ReferenceChoice], console: Console) -> None:
     for choice in choices:
-        table = _table(choice, wide=console.width >= WIDE)
-        if _room(table) <= console.width:
-            console.print(table)
-        else:
-            console.print(Text(str(table.title), style="bold"), *_lines(table), sep="\n")
+        console.print(_table(choice, wide=console.width >= WIDE))
         console.print()
 
 
 def _table(choice: ReferenceChoice, *, wide: bool) -> Table:
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), title_justify="left", title_style="bold")
     table.title = f"{choice.reference} -> {choice.target}"
-    table.add_column("", no_wrap=True)
-    table.add_column("gesture", no_wrap=True)
-    table.add_column("phrase", min_width=WRAPPED, overflow="fold")
-    table.add_column("|D|", justify="right", no_wrap=True)
-    if wide:
-        table.add_column("distractors", ratio=1, overflow="fold")
-    for name in ("r", "R", "Rmin", "cost"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("verdict", min_width=WRAPPED, overflow="fold")
+    for name in ("", "gesture", "phrase", "|D|", *(("distractors",) if wide else ()), *NUMBERS, "verdict"):
+        table.add_column(name, justify="right" if name in ("|D|", *NUMBERS) else "left", overflow="fold")
     for pair in choice.pairs:
         style = "bold green" if pair.chosen else "" if pair.feasible else "dim"
         named = [_named(pair.distractors)] if wide else []
@@ -115,22 +103,6 @@ def _table(choice: ReferenceChoice, *, wide: bool) -> Table:
             style=style,
         )
     return table
-
-
-def _room(table: Table) -> int:
-    """Columns of the terminal that the table needs: with fewer, Rich leaves some of it out."""
-    return sum(
-        1 + (max(len(str(cell)) for cell in (column.header, *column.cells)) if column.no_wrap else WRAPPED)
-        for column in table.columns
-    )
-
-
-def _lines(table: Table) -> Iterator[Text]:
-    """The rows of a table as text that wraps, each cell behind the name of its column."""
-    names = [str(column.header) for column in table.columns]
-    for row, cells in zip(table.rows, zip(*(column.cells for column in table.columns), strict=True), strict=True):
-        told = ", ".join(f"{name} {cell}" for name, cell in zip(names, cells, strict=True) if name)
-        yield Text(f"{cells[0] or '-'} {told}", style=row.style or "")
 
 
 def _numbers(pair: PairConsidered) -> list[str]:

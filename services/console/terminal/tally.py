@@ -1,6 +1,6 @@
 """Numbers at the end of a session: events of each kind with outcome and delays, MTBCE, duration."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -92,44 +92,21 @@ def count(tally: Tally, kind: EventKind, initiator: str | None, robot: str) -> C
     )
 
 
-TABLE_WIDTH = 76
-"""Columns that the table takes."""
 KINDS: tuple[tuple[EventKind, str], ...] = tuple(wording.KINDS.items())
 
 
-def render(tally: Tally, robot: str, width: int = 80) -> RenderableType:
-    """Draw the table, or where it would be cut off a line for each of its rows, and the last lines.
-
-    width: of the terminal, in columns.
-    """
-    rows = [
-        (name_of_initiator, name, row)
-        for initiator, name_of_initiator in ((robot, robot), (None, "people"))
-        for kind, name in KINDS
-        if (row := count(tally, kind, initiator, robot)).count
-    ]
-    drawn = _table(rows) if width >= TABLE_WIDTH else Text("\n".join(_sentence(*row) for row in rows))
-    return Group(drawn, Text(_NOTE, style="dim"), Text(_last_lines(tally)))
-
-
-def _table(rows: Iterable[tuple[str, str, Counted]]) -> Table:
+def render(tally: Tally, robot: str) -> RenderableType:
+    """Draw the table and the last lines."""
     table = Table(box=box.HORIZONTALS, padding=0, show_edge=False)
-    table.add_column("by", no_wrap=True)
-    table.add_column("connection event", no_wrap=True)
-    for name in ("count", "succeeded", "failed", "opt.", "dropped", "delay (s)"):
-        table.add_column(name, justify="right", no_wrap=True)
-    for who, kind, row in rows:
-        numbers = (row.count, row.succeeded, row.failed, row.failed_optional, row.other + row.open)
-        table.add_row(Text(who), kind, *map(str, numbers), _delays(row.delays))
-    return table
-
-
-def _sentence(who: str, kind: str, row: Counted) -> str:
-    parts = (
-        f"{row.succeeded} succeeded", f"{row.failed} failed", f"{row.failed_optional} opt.",
-        f"{row.other + row.open} dropped", f"delay {_delays(row.delays)} s",
-    )  # fmt: skip
-    return f"{who}, {kind}: {row.count}; {', '.join(parts)}"
+    for name in ("by", "connection event", "count", "succeeded", "failed", "opt.", "dropped", "delay (s)"):
+        table.add_column(name, justify="left" if name in ("by", "connection event") else "right", overflow="fold")
+    for initiator, who in ((robot, robot), (None, "people")):
+        for kind, name in KINDS:
+            row = count(tally, kind, initiator, robot)
+            if row.count:
+                numbers = (row.count, row.succeeded, row.failed, row.failed_optional, row.other + row.open)
+                table.add_row(Text(who), name, *map(str, numbers), _delays(row.delays))
+    return Group(table, Text(_NOTE, style="dim"), Text(_last_lines(tally)))
 
 
 _NOTE = (

@@ -32,6 +32,7 @@ from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, 
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
+from engage_hri.services.bus.deadlines import Acquaintances
 from engage_hri.services.console import nets, view, wording
 from engage_hri.services.console.web import scene
 from engage_hri.services.console.web.health import HealthBoard
@@ -39,7 +40,6 @@ from engage_hri.services.console.web.lanes import BlockLanes, EventLanes, Measur
 from engage_hri.services.console.web.scene import plainly
 from engage_hri.services.console.web.sections import Choice, HeadSection, Note, Switched, UtteranceShown
 from engage_hri.services.console.web.turns import ShownTurns
-from engage_hri.services.runtime.absent import Acquaintances
 
 CHOICES_KEPT = 40
 NOTES_KEPT = 40

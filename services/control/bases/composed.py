@@ -24,11 +24,12 @@ from engage_hri.services.control.contract.body import (
     BehaviorRefused,
     Body,
     BodyState,
+    Idle,
     MouthShape,
     MovementAuthority,
     Progress,
+    Seen,
 )
-from engage_hri.services.control.contract.extras import Idle, Seen
 from engage_hri.services.control.contract.refusals import infeasible, unsupported
 from engage_hri.services.runtime.steps import Steps, finished
 

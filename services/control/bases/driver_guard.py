@@ -35,12 +35,13 @@ from engage_hri.services.control.contract.body import (
     BodyFailed,
     BodyState,
     DriverBroken,
+    Idle,
     MouthShape,
     MovementAuthority,
     Progress,
     Revoked,
+    Seen,
 )
-from engage_hri.services.control.contract.extras import Idle, Seen
 from engage_hri.services.control.contract.refusals import infeasible
 from engage_hri.services.runtime.steps import Steps
 

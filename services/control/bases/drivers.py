@@ -30,8 +30,7 @@ from engage_hri.services.control.bases.driver_guard import GuardedBody
 from engage_hri.services.control.bases.error_place import seen_at, words_of
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.body import Body
-from engage_hri.services.runtime.installation import packages_command
-from engage_hri.services.runtime.offers import BODIES, VOICES, Offer, offers, unreadable
+from engage_hri.services.runtime.installation import BODIES, VOICES, Offer, offers, packages_command, unreadable
 
 FORMS = "NAME, FILE.py:CLASS or package.module:CLASS"
 _OWN = __name__.partition(".")[0]

@@ -13,12 +13,13 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.contract.bell import Bell
 from engage_hri.services.control.contract.body import MovementAuthority
-from engage_hri.services.control.figure.choreography import is_shift
-from engage_hri.services.control.figure.course import Course
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import Path
-from engage_hri.services.control.motion.points import WalkPoint
+from engage_hri.services.control.motion.points import MotionPlan, WalkPoint, is_shift
 from engage_hri.services.control.motion.track import Track
+
+FREEZE: Seconds = 0.5
+"""Seconds that a part stands still when it is told to freeze, before it relaxes."""
 
 
 class Clock(Protocol):
@@ -34,9 +35,10 @@ class Run:
     given its parts. holding: it waits at a hold point, standing or still coming to a stop.
     """
 
+    course: MotionPlan
     motion: Motion
 
-    def __init__(self, behavior: BlockBehavior, course: Course, authority: MovementAuthority) -> None:
+    def __init__(self, behavior: BlockBehavior, course: MotionPlan, authority: MovementAuthority) -> None:
         self.behavior, self.course, self.authority = behavior, course, authority
         self.bell = Bell()
         self.pending: list[WalkPoint] = list(course.points)
@@ -138,7 +140,7 @@ class MovingParts(ABC, Generic[R]):
         self.clock = clock
         self.tracks: Mapping[str, Any] = tracks
         for track in tracks.values():
-            track.trunk = tracks["torso"]
+            track.trunk = tracks.get("torso", track)
         self.runs: dict[str, R] = {}
         self.homeward: list[Bell] = []
         """Bells of those who wait for parts to come home: each behavior that takes parts rings them."""
@@ -248,6 +250,7 @@ class MovingParts(ABC, Generic[R]):
         run.motion.extend(run.limit(run.motion.path), now)
         run.brake_for_hold(now)
 
-    def stop(self, run: R) -> None:
-        """Stop the motion of a behavior as soon as its joints can: it is to freeze."""
+    def stop(self, run: R) -> Seconds:
+        """Stop the motion of a behavior that is to freeze. Returns until when its parts then stand still."""
         run.motion.brake(self.clock.time())
+        return run.motion.end + FREEZE

@@ -14,9 +14,11 @@ A sync point is where the *measured* angles are: an SDK's "finished" often means
 import asyncio
 import math
 from abc import abstractmethod
-from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import AsyncIterator, Awaitable, Collection, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
-from typing import ClassVar, NamedTuple
+from math import inf
+from typing import ClassVar
 
 from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.behaviors import BlockBehavior, Pointing
@@ -25,43 +27,106 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Meters, Radians, Seconds, Vector
 from engage_hri.schemas.world import World
-from engage_hri.services.bus.sight import Sight
+from engage_hri.services.bus.deadlines import Sight, Silences
+from engage_hri.services.control.bases.moving_parts import MovingParts, Run
+from engage_hri.services.control.bases.walk import WalkingBody
+from engage_hri.services.control.bases.watch import Watch
 from engage_hri.services.control.contract.body import (
-    Arrived,
     BehaviorRefused,
-    Body,
     BodyFailed,
     BodyState,
     MovementAuthority,
-    Progress,
-    Reached,
-    Revoked,
-    TakenOver,
 )
 from engage_hri.services.control.contract.refusals import infeasible
-from engage_hri.services.requests.deadlines import Silences
+from engage_hri.services.control.motion.points import MotionPlan, WalkPoint
+from engage_hri.services.control.motion.track import Track
 
 Angles = Mapping[str, Radians]
 Way = Sequence[tuple[str, Angles]]
 """Joint angles at which sync points are passed, in order."""
+Goals = Mapping[str, Angles]
 
 
-class _Doing:
-    """A behavior that has the part. sync: the point whose goal it is at, or on its way to; empty: none yet."""
+class OnePartRun(Run):
+    """A behavior that has the one part. goals: where the joints have to be, by the sync point that needs it.
 
-    def __init__(self, behavior: BlockBehavior, authority: MovementAuthority, goals: Mapping[str, Angles]) -> None:
-        self.behavior, self.authority, self.goals = behavior, authority, goals
+    sync: the point whose goal it is at, or on its way to; empty: none yet. at: when it was last measured at one.
+    """
+
+    def __init__(self, behavior: BlockBehavior, plan: MotionPlan, authority: MovementAuthority, goals: Goals) -> None:
+        super().__init__(behavior, plan, authority)
+        self.goals = goals
         self.sync = ""
+        self.at: Seconds = _now()
+
+    def leave(self, hold: str, now: Seconds) -> list[str]:
+        passed = [point.sync for point in self.pending if point.held_with == hold]
+        self.pending = [point for point in self.pending if point.held_with != hold]
+        self.holding = False
+        return passed
+
+    def passed_by(self, at: Seconds) -> list[tuple[str, Seconds]]:
+        return []  # a point that the joints were measured at has been reported at once
 
 
-class _Look(NamedTuple):
-    """An entity that the eyes were turned to. goal: where the joints are for it."""
+class OnePart(MovingParts[OnePartRun]):
+    """The one part of a body, and who has it. There is no plan in time: a goal is commanded, and then measured.
 
-    target: str
-    goal: Callable[[], Angles]
+    goal: where the part rests: at home, or where a shift has taken it. shift: the one that has; None: none.
+    """
+
+    def __init__(self, body: "OrdinaryBody", home: Angles) -> None:
+        super().__init__(asyncio.get_running_loop(), {body.part: Track(body.part, body.joints, tuple(home.values()))})
+        self._body, self.home = body, home
+        self.goal = home
+        self.shift: BlockBehavior | None = None
+
+    def goal_of(self, run: OnePartRun) -> Angles:
+        """Goal of a behavior now: at the end where the part rests, unless it goes elsewhere itself."""
+        return run.goals.get(run.sync, self.goal)
+
+    def take_over(self, run: OnePartRun) -> None:
+        self.take(run)
+
+    def extend(self, run: OnePartRun) -> None:
+        if (sync := run.pending[0].sync) != run.sync and (sync in run.goals or sync == "end"):
+            run.sync = sync
+            self._body.set_off(self.goal_of(run))
+
+    def leave(self, run: OnePartRun, point: WalkPoint, *, has_waited: bool) -> Sequence[str]:
+        if has_waited:
+            return run.leave(point.held_with, self.clock.time())
+        return [run.pending.pop(0).sync]
+
+    def abandon(self, run: OnePartRun) -> None:
+        self.relax((self._body.part,))
+
+    def relax(self, names: Collection[str]) -> None:
+        if names:
+            with suppress(BodyFailed):
+                self._body.set_off(self.goal)
+
+    def rest_on(self, run: OnePartRun | None) -> None:
+        self.goal = self.home if run is None else run.goals["end"]
+        self.shift = None if run is None else run.behavior
+
+    def stop(self, run: OnePartRun) -> Seconds:
+        return self.clock.time()  # motors with a goal promise no stop on the way: the part goes home at once
+
+    def follow(self) -> None:
+        """Aim anew where a target has moved. What is out of reach now is looked at where it was last."""
+        run = self.runs.get(self._body.part)
+        if self.shift is not None:
+            with suppress(BehaviorRefused):
+                self.goal = self._body.goals(self.shift, self.world)["end"]
+        if run is not None and hasattr(run.behavior, "target"):
+            with suppress(BehaviorRefused):
+                run.goals = self._body.goals(run.behavior, self.world)
+        if run is None or run.sync:
+            self._body.keep_at(self.goal if run is None else self.goal_of(run))
 
 
-class OrdinaryBody(Body):
+class OrdinaryBody(WalkingBody[OnePartRun]):
     """A robot with one part, which makes one motion at a time: derive a driver from it.
 
     name: of the robot. part: its one part: `head`, `right_arm`, ... types: the behaviors that `aim` and `way` know.
@@ -87,25 +152,23 @@ class OrdinaryBody(Body):
     patience: ClassVar[float] = 3.0
     rate: ClassVar[float] = 50.0
 
+    moves: OnePart
+
     def __init__(self) -> None:
+        super().__init__()
         self.capabilities = Capabilities(
             body=self.name, types=self.types, parts=(self.part,), joints=self.joints, reach=self.reach
         )
-        self.world = World(entities=())
-        self._home: Angles = {limit.joint: self.rest.get(limit.joint, 0.0) for limit in self.joints}
-        self._base: Angles = self._home
-        """Where it rests: at home, or where a shift has taken it."""
-        self._sight = Sight("control")
-        self._settled: BlockBehavior | None = None
-        """The shift that has set where it rests; None: it rests at home."""
-        self._shifts = 0
-        """Number of times that a behavior or `home` has set where it rests."""
-        self._doing: _Doing | None = None
-        self._look: _Look | None = None
+        self.moves = OnePart(self, {limit.joint: self.rest.get(limit.joint, 0.0) for limit in self.joints})
         self._goal: Angles | None = None
-        """Where the joints are on their way to; None: they stand."""
-        self._from: Angles = {}
-        """Where the joints were as the last command was sent."""
+        """Where the motors were told to go; None: they stand there."""
+        self._has_come = True
+        """False while what moves it has not come to its goal once: a target that moves on changes nothing in that."""
+        self._came: Seconds = -inf
+        """When the joints were measured at their goal; -inf: they have not moved for it."""
+        self._overdue = Silences[str](Sight("control"))
+        self._told: tuple[Angles, Seconds, Seconds] = ({}, 0.0, 0.0)
+        """Where the joints were as the last command was sent, when that was, and the seconds that it takes."""
         self._is_open = False
         self._sending: asyncio.Future[None] | None = None
         """Of a command that takes time."""
@@ -203,14 +266,12 @@ class OrdinaryBody(Body):
     # -- what follows from it -----------------------------------------------------------------------------------
 
     def _way(self, behavior: BlockBehavior, world: World) -> Way:
-        """The whole way of a behavior, with the way back to rest. Raises BehaviorRefused."""
+        """The way of a behavior, without that back to rest. Raises BehaviorRefused."""
         if type_name(behavior) not in self.types:
             raise refused(behavior, f"this body has no {type_name(behavior)}")
-        way = list(self.way(behavior, world))
+        way = self.way(behavior, world)
         for sync, goal in way:
             self._check(behavior, sync, goal)
-        if way[-1][0] != "end":
-            way.append(("end", self._base))
         return way
 
     def _check(self, behavior: BlockBehavior, sync: str, goal: Angles) -> None:
@@ -224,8 +285,11 @@ class OrdinaryBody(Body):
                 reason = f"{wanted}; it goes from {low:.0f} to {high:.0f}"
                 raise refused(behavior, reason)
 
-    def _goals(self, behavior: BlockBehavior, world: World) -> Mapping[str, Angles]:
-        """The goals of a behavior, as `by_instant`. Raises BehaviorRefused."""
+    def goals(self, behavior: BlockBehavior, world: World) -> Goals:
+        """Goals by the first point of each instant. Raises BehaviorRefused.
+
+        behavior: what to do. world: where its targets are.
+        """
         return by_instant(behavior, self._way(behavior, world))
 
     def _seconds(self, here: Angles, goal: Angles) -> Seconds:
@@ -256,13 +320,15 @@ class OrdinaryBody(Body):
 
     def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
         try:
-            way = self._way(behavior, world)
+            way = list(self._way(behavior, world))
         except BehaviorRefused as refused:
             target = getattr(behavior, "target", "")
             warning = "NO_SUCH_TARGET" if target and world.entity(target) is None else "CANNOT_CREATE_BEHAVIOR"
             if type_name(behavior) not in self.types:
                 warning = "BEHAVIOR_TYPE_NOT_SUPPORTED"
             return infeasible(behavior.id, warning, refused.fault)
+        if way[-1][0] != "end":
+            way.append(("end", self.moves.goal))
         here = dict(self._measured())
         here |= {angle.joint: angle.angle for angle in pose.joints if angle.joint in here} if pose else {}
         row, phases, since = TYPES[type_name(behavior)], [], "start"
@@ -284,177 +350,133 @@ class OrdinaryBody(Body):
             pose_after=_pose(target), pose_end=_pose(at),
         )  # fmt: skip
 
-    async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-        row = TYPES[type_name(behavior)]
-        doing = _Doing(behavior, authority, self._goals(behavior, self.world))
-        at = came = _now()
-        is_beneath = row.turns_base and self._doing is not None and self._doing.authority.points != row.points
-        if row.turns_base:
-            self._rest_at(doing.goals["end"], behavior)
-        shifts = self._shifts
-        if is_beneath:  # beneath a look nothing moves
-            for sync in authority.points:
-                yield Reached(sync, at, at)
-            return
-        if self._doing is not None:
-            self._doing.authority.revoke("taken_over")  # it wakes, and ends without its next points
-        self._doing = doing
-        passed = 0
-        try:
-            for sync in authority.points:
-                if sync in doing.goals:
-                    arrived = await self._reach(sync, doing)
-                    at = came = at if arrived is None else arrived
-                hold = _last_of_instant(row.one_instant, sync)
-                if hold in row.holds and not authority.covers(hold):
-                    yield Arrived(hold, came := at)
-                    await authority.granted(hold)
-                    at = max(_now(), await self._stay(doing) or 0.0)
-                yield Reached(sync, at, came)
-                passed += 1
-                if hold == sync:  # the next point is another instant
-                    came = at
-        except Revoked:
-            if row.turns_base and authority.revoked == "taken_over" and self._shifts == shifts:
-                yield Reached("end", _now(), _now())  # a look lies over it, and goes home to there
-        finally:
-            if self._doing is doing:
-                self._doing = None
-                if passed < len(authority.points):
-                    with suppress(BodyFailed):
-                        self._command(self._base)
+    def set_out(self, behavior: BlockBehavior, authority: MovementAuthority) -> OnePartRun:
+        row, goals = TYPES[type_name(behavior)], self.goals(behavior, self.moves.world)
+        together = {sync: group[-1] for group in row.one_instant for sync in group}
+        points = tuple(
+            WalkPoint(sync, hold if (hold := together.get(sync, sync)) in row.holds else "") for sync in row.points
+        )
+        names = tuple(limit.joint for limit in self.joints)
+        plan = MotionPlan(parts=(self.part,), joints=names, legs=(), points=points)
+        return self.moves.set_out(OnePartRun(behavior, plan, authority, goals))
 
-    async def home(self, parts: tuple[str, ...] = ()) -> None:
-        if parts and self.part not in parts:
-            return
-        if self._doing is not None:
-            self._doing.authority.revoke()
-            self._doing = None
-        self._rest_at(self._home, None)
-        await self._move(lambda: self._home, None, "home")
+    def due(self, run: OnePartRun, point: WalkPoint) -> Seconds:
+        return run.at
+
+    async def come(self, run: OnePartRun, point: WalkPoint, due: Seconds) -> Seconds | None:
+        if run.sync != point.sync and not (run.holding and run.sync):
+            return due  # it has nowhere to go for this point
+        if not self._is_there(self.moves.goal_of(run), run.sync):
+            await run.bell.wait(self._loop.time() + 1.0 / self.rate)
+            return None
+        run.at = max(run.at, self._came)
+        return run.at
+
+    def has_come(self, run: OnePartRun, point: WalkPoint) -> bool:
+        return not run.sync or self._off(self.moves.goal_of(run)) is None
+
+    def coming_home(self, going: Collection[str], watches: defaultdict[str, Watch]) -> Seconds | None:
+        if not going or self._is_there(self.moves.goal, "home"):
+            return None
+        return self._loop.time() + 1.0 / self.rate
 
     def state(self) -> BodyState:
         angles = self._measured()
-        arm = self.forearm(angles)
         self._note_arrival(angles)
+        arm = self.forearm(angles)
         return BodyState(
             pose=_pose(angles), moving=self._goal is not None, gaze=self.gaze(angles),
             left_arm=arm if self.part == "left_arm" else None,
-            right_arm=arm if self.part != "left_arm" else None,
-            looking_at=self._look.target if self._look is not None and self._rests_on(self._look, angles) else "",
+            right_arm=arm if self.part != "left_arm" else None, looking_at=self._looking_at(angles),
         )  # fmt: skip
 
+    def _looking_at(self, angles: Angles) -> str:
+        """Id of the entity that the part was turned to, if the joints are there; empty: none."""
+        run, moves = self.moves.runs.get(self.part), self.moves
+        look, goal = moves.shift, moves.goal
+        if run is not None and run.sync in run.goals:
+            look = run.behavior if TYPES[type_name(run.behavior)].family == "gaze" else None
+            goal = moves.goal_of(run)
+        off = self._off(goal, angles)
+        rests = self._has_come and (off is None or abs(off[1]) <= self.capabilities.gaze_half_angle)
+        return getattr(look, "target", "") if rests else ""
+
     def see(self, world: World) -> None:
-        before, self.world = self.world, world
+        self.moves.world = world
         if self._is_open:
-            self._follow(before)
+            self.moves.follow()
 
     def _measured(self) -> Angles:
         """Measure the joints. Without a connection, as for `engage plan`, they are at rest."""
-        return self.angles() if self._is_open else self._home
-
-    # -- what moves in the world --------------------------------------------------------------------------------
-
-    def _rest_at(self, base: Angles, shift: BlockBehavior | None) -> None:
-        self._base, self._settled = base, shift
-        self._shifts += 1
-
-    def _follow(self, before: World) -> None:
-        """Aim anew where a target has moved. What is out of reach now is looked at where it was last."""
-        doing, has_moved = self._doing, False
-        if self._settled is not None and self._moved(self._settled, before):
-            with suppress(BehaviorRefused):
-                self._base = self._goals(self._settled, self.world)["end"]
-                has_moved = doing is None
-        if doing is not None and self._moved(doing.behavior, before):
-            with suppress(BehaviorRefused):
-                doing.goals = self._goals(doing.behavior, self.world)
-                has_moved = True
-        goal = self._base if doing is None else doing.goals.get(doing.sync)
-        if has_moved and goal is not None and self._goal is None:  # else who moves it sees the new goal
-            with suppress(BodyFailed):
-                if self._off(goal) is not None:
-                    self._command(goal)
-
-    def _moved(self, behavior: BlockBehavior, before: World) -> bool:
-        target = getattr(behavior, "target", "")
-        was, now = before.entity(target), self.world.entity(target)
-        return was is not None and now is not None and was.position != now.position
-
-    def _rests_on(self, look: _Look, angles: Angles) -> bool:
-        off = self._off(look.goal(), angles)
-        return off is None or abs(off[1]) <= self.capabilities.gaze_half_angle
+        return self.angles() if self._is_open else self.moves.home
 
     # -- motion -------------------------------------------------------------------------------------------------
 
-    async def _reach(self, sync: str, doing: _Doing) -> Seconds | None:
-        """Move to where a sync point is. Returns when the joints were measured there; None: they were already."""
-        doing.sync = sync
-        if sync == "end":
-            arrived = await self._move(lambda: self._base, doing.authority, sync)
-            self._look_at(self._settled, lambda: self._base)
-            return arrived
-        arrived = await self._move(lambda: doing.goals[sync], doing.authority, sync)
-        is_look = TYPES[type_name(doing.behavior)].family == "gaze"
-        self._look_at(doing.behavior if is_look else None, lambda: doing.goals[sync])
-        return arrived
+    def set_off(self, goal: Angles) -> None:
+        """Begin a motion, unless the joints stand there. Raises BodyFailed: the motors take no command.
 
-    async def _stay(self, doing: _Doing) -> Seconds | None:
-        """Go back to where it waits if it is elsewhere: a motor gives way, a target moves on. Returns as `_reach`."""
-        return await self._reach(doing.sync, doing) if doing.sync else None
+        goal: angles of all joints.
+        """
+        self._came, self._has_come = -inf, False
+        if self._goal is not None or self._off(goal) is not None:
+            self._command(goal)
 
-    def _look_at(self, behavior: BlockBehavior | None, goal: Callable[[], Angles]) -> None:
-        target = getattr(behavior, "target", "")
-        self._look = _Look(target, goal) if target else None
+    def keep_at(self, goal: Angles) -> None:
+        """Go after a goal that has moved; who is on the way there sees it by himself.
 
-    async def _move(
-        self, goal: Callable[[], Angles], authority: MovementAuthority | None, sync: str
-    ) -> Seconds | None:
-        """Move until the measured angles are at the goal, which may move. Raises Revoked, TakenOver or BodyFailed."""
-        if authority is not None and authority.revoked:
-            raise Revoked
-        if self._off(goal()) is None and self._goal is None:
-            return None
-        self._look, to, time = None, None, Silences[str](self._sight)
-        seconds = began = 0.0
-        while to is None or _apart(to, goal()) > self.near or self._off(goal()) is not None:
-            if authority is not None and authority.revoked:
-                raise Revoked
-            if authority is None and self._doing is not None:
-                raise TakenOver((self.part,))
-            if to is None or _apart(to, goal()) > self.near:
-                to, began = goal(), _now()
-                seconds = self._command(to)
-                time.set(sync, began + self.patience * seconds + 1.0)
-            elif self._failure is not None:
-                raise self._failure
-            elif time.due(_now()) is not None:
-                raise BodyFailed(self._short(goal(), sync, _now() - began, seconds))
-            await asyncio.sleep(1.0 / self.rate)
-        self._goal = None
-        return _now()
+        goal: angles of all joints.
+        """
+        if self._goal is None and self._off(goal) is not None:
+            with suppress(BodyFailed):
+                self._command(goal)
 
-    def _short(self, goal: Angles, sync: str, waited: Seconds, planned: Seconds) -> Fault:
+    def _is_there(self, goal: Angles, sync: str) -> bool:
+        """Tell if the measured joints are at a goal, which may have moved. Raises BodyFailed: they do not come."""
+        self._note_arrival(angles := self._measured())
+        if self._goal is None and self._off(goal, angles) is None:
+            self._has_come = True
+            return True
+        if self._goal is None or _apart(self._goal, goal) > self.near:
+            self._command(goal)
+        elif self._failure is not None:
+            raise self._failure
+        elif self._overdue.due(self._loop.time()) is not None:
+            raise BodyFailed(self._short(goal, sync))
+        return False
+
+    def _note_arrival(self, angles: Angles) -> None:
+        """Note that a motion has come to its end, whether somebody waits for that or not."""
+        if self._goal is not None and self._off(self._goal, angles) is None:
+            self._goal, self._came, self._has_come = None, self._loop.time(), True
+
+    def _short(self, goal: Angles, sync: str) -> Fault:
         joint, angle = self._off(goal) or ("", 0.0)
-        turned = self._measured().get(joint, 0.0) - self._from.get(joint, 0.0)
+        since, began, planned = self._told
+        turned = self._measured().get(joint, 0.0) - since.get(joint, 0.0)
         is_other_way = turned * angle < 0.0 and abs(turned) > self.near
         where = f"{math.degrees(abs(angle)):.1f} degrees short of its goal"
         other_way = ", and has turned the other way" if is_other_way else ""
         return Fault(
-            reason=f"{joint} stands {where} {waited:.1f} s after the command to go to its {sync}; planned were "
-                   f"{planned:.1f} s{other_way}",
-            advice="is a sign turned around?" if is_other_way else "is the motor on, free and not too hot?",
-            service="control",
+            reason=f"{joint} stands {where} {self._loop.time() - began:.1f} s after the command to go to its {sync}; "
+                   f"planned were {planned:.1f} s{other_way}",
+            advice=self.suspicion(joint, is_other_way=is_other_way), service="control",
         )  # fmt: skip
 
-    def _command(self, goal: Angles) -> Seconds:
-        """Command the motors. Returns the time that is planned until the joints are measured there."""
-        self._from = self._measured()
-        seconds = self._seconds(self._from, goal)
-        self._goal, self._failure = goal, None
+    def suspicion(self, joint: str, *, is_other_way: bool) -> str:
+        """Tell why a joint may not have come.
+
+        joint: its name. is_other_way: it has moved, the other way.
+        """
+        return "is a sign turned around?" if is_other_way else "is the motor on, free and not too hot?"
+
+    def _command(self, goal: Angles) -> None:
+        """Command the motors, and expect the joints to be measured there in time."""
+        here, now = self._measured(), self._loop.time()
+        seconds = self._seconds(here, goal)
+        self._told, self._goal, self._failure = (here, now, seconds), goal, None
+        self._overdue.set("goal", now + self.patience * seconds + 1.0)
         self._next = (goal, max(0.0, seconds - self.settling))
         self._send_next()
-        return seconds
 
     def _send_next(self) -> None:
         """Send the command that is due, or, while one that takes time is under way, the last one after it.
@@ -475,18 +497,7 @@ class OrdinaryBody(Body):
             sent.result()
             self._send_next()
         except Exception as error:
-            self._fail(error)
-
-    def _fail(self, error: Exception) -> None:
-        """Let the motion fail that is under way, since the motors did not take a command."""
-        self._failure = error
-
-    def _note_arrival(self, angles: Angles) -> None:
-        """Note that a motion that nobody waits for has come to its end."""
-        if self._goal is not None and self._off(self._goal, angles) is None:
-            self._goal = None
-            if self._doing is None:
-                self._look_at(self._settled, lambda: self._base)
+            self._failure = error
 
     def _off(self, goal: Angles, here: Angles | None = None) -> tuple[str, Radians] | None:
         """The joint that is farthest from the goal, and by how much; None: all are near. here: None: measured now."""
@@ -498,11 +509,6 @@ class OrdinaryBody(Body):
 
 def _apart(one: Angles, other: Angles) -> Radians:
     return max((abs(one[joint] - other[joint]) for joint in one), default=0.0)
-
-
-def _last_of_instant(groups: Sequence[Sequence[str]], sync: str) -> str:
-    """The point at which the points of one instant wait together: the last one of them."""
-    return next((group[-1] for group in groups if sync in group), sync)
 
 
 def _pose(angles: Angles) -> BodyPose:

@@ -93,7 +93,7 @@ class SetPointBody(OrdinaryBody):
                 if sent is not None:
                     await sent
             except Exception as error:  # of the motors, or a mistake of the driver
-                self._fail(error)
+                self._failure = error
             await asyncio.sleep(1.0 / self.rate)
 
 

@@ -45,10 +45,7 @@ from engage_hri.services.control.contract.body import (
 )
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.motion.points import WalkPoint
-from engage_hri.services.control.voice import speaking
 
-FREEZE: Seconds = 0.5
-"""Seconds that a part stands still when it is told to freeze, before it relaxes."""
 CATCHES_UP: Seconds = 0.02
 """Seconds between two looks at whether it has come to a target that has moved."""
 
@@ -60,7 +57,7 @@ class WalkingBody(Body, Generic[R]):
     """
 
     moves: MovingParts[R]
-    patience: Seconds = PATIENCE
+    stuck_after: Seconds = PATIENCE
     """Seconds without any way after which joints on their way home are stuck."""
 
     def __init__(self) -> None:
@@ -71,22 +68,32 @@ class WalkingBody(Body, Generic[R]):
 
     @abstractmethod
     def set_out(self, behavior: BlockBehavior, authority: MovementAuthority) -> R:
-        """Begin a behavior: `MovingParts.set_out`. Raises BehaviorRefused, Impossible."""
+        """Begin a behavior: `MovingParts.set_out`. Raises BehaviorRefused, Impossible.
+
+        behavior: what to do. authority: that under which it moves.
+        """
 
     def due(self, run: R, point: WalkPoint) -> Seconds | None:
-        """Instant at which the plan of a behavior passes a point; None: it does not go so far yet."""
+        """Instant at which the plan of a behavior passes a point; None: it does not go so far yet.
+
+        run: the behavior. point: where it is to come to.
+        """
         return run.due(point)
 
     async def come(self, run: R, point: WalkPoint, due: Seconds) -> Seconds | None:
-        """Wait until the joints have come to a point that the plan has passed at `due`. Returns when they had.
+        """Wait until the joints have come to a point that the plan has passed. Returns when they had.
 
+        run: the behavior. point: where they are to come to. due: when the plan passed it, in seconds.
         None: something else may have changed; the walk looks again. Raises BodyFailed. Not overridden, the joints are
         where the plan has them.
         """
         return due
 
     def has_come(self, run: R, point: WalkPoint) -> bool:
-        """True if the joints have come to a point that the plan has passed."""
+        """True if the joints have come to a point that the plan has passed.
+
+        run: the behavior. point: where they were to come to.
+        """
         return True
 
     def check(self, run: R) -> None:
@@ -100,9 +107,10 @@ class WalkingBody(Body, Generic[R]):
         return False
 
     def coming_home(self, going: Collection[str], watches: defaultdict[str, Watch]) -> Seconds | None:
-        """Look if the joints of these tracks are at home; None: they are. Returns when to look again (inf: on news).
+        """Look if joints are at home; None: they are. Returns when to look again (inf: on news).
 
-        watches: of their joints, since they have set out. Raises BodyFailed: they make no way any more.
+        going: names of their tracks. watches: of their joints, since they have set out. Raises BodyFailed: they make
+        no way any more.
         """
         until: Seconds = max((self.moves.tracks[name].motion.end for name in going), default=0.0)
         return None if self._loop.time() >= until - EARLY else until
@@ -110,12 +118,12 @@ class WalkingBody(Body, Generic[R]):
     # -- the walk -----------------------------------------------------------------------------------------------
 
     def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-        return speaking.wait(behavior, authority) if isinstance(behavior, Wait) else self.walk(behavior, authority)
+        return wait(behavior, authority) if isinstance(behavior, Wait) else self.walk(behavior, authority)
 
     async def home(self, parts: tuple[str, ...] = ()) -> None:
         going, watches, bell = (
             self.moves.go_home(parts),
-            defaultdict[str, Watch](lambda: Watch(self.patience)),
+            defaultdict[str, Watch](lambda: Watch(self.stuck_after)),
             Bell(),
         )
         self.moves.homeward.append(bell)
@@ -218,7 +226,28 @@ class WalkingBody(Body, Generic[R]):
             yield Reached("end", at := self._loop.time(), at)
 
     async def _freeze(self, run: R) -> None:
-        self.moves.stop(run)
-        until = run.motion.end + FREEZE
+        until = self.moves.stop(run)
         while self.moves.owns(run) and not run.bell.is_past(until):
             await run.bell.wait(until)
+
+
+async def wait(behavior: Wait, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
+    """Let the duration of the behavior pass, and then hold until its end may be passed."""
+    bell = Bell()
+    begin = bell.now()
+    due = begin + (behavior.duration or 0.0)
+    unwatch = authority.watch(bell.ring)
+    try:
+        yield Reached("start", begin, begin)
+        while not bell.is_past(due) and authority.revoked is None:
+            await bell.wait(due)
+        left = due
+        if authority.revoked is None and not authority.covers("end"):
+            yield Arrived("end", due)
+            while authority.revoked is None and not authority.covers("end"):
+                await bell.wait(inf)
+            left = bell.now()
+        if authority.revoked is None:
+            yield Reached("end", left, due)
+    finally:
+        unwatch()

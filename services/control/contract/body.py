@@ -8,21 +8,20 @@ import asyncio
 from abc import ABC, abstractmethod
 from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Iterable, Mapping, Sequence
 from contextlib import asynccontextmanager
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
+from math import inf
+from typing import Any, ClassVar, Literal, Self
 
 from msgspec import Struct
 
 from engage_hri.schemas.behavior_types import sync_points
 from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, Ray
-from engage_hri.schemas.faults import EngageError, Fault
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.body_faults import BodyFault
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.control.contract.extras import Extras
+from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.runtime.steps import Steps
-
-if TYPE_CHECKING:
-    from engage_hri.services.control.config import ControlConfig
 
 ELEMENTS = 128
 """Elements that an estimate counts for (see `runtime.steps`): some four are made between two pauses."""
@@ -265,7 +264,26 @@ class MouthShape(Struct, frozen=True):
     width: float = 0.0
 
 
-class Body(Extras, ABC):
+class Seen(Struct, frozen=True, kw_only=True):
+    """Rays as in `BodyState`, as people and cameras see them."""
+
+    gaze: Ray | None = None
+    left_arm: Ray | None = None
+    right_arm: Ray | None = None
+
+
+class Idle(Struct, frozen=True, kw_only=True):
+    """Motion that belongs to no behavior: breath, blinks, lips with the voice.
+
+    added: what it adds to the angles of joints that `Body.state` tells. quick_at: loop time from which on it changes
+    quickly; earlier than now: it does; inf: not in sight.
+    """
+
+    added: Mapping[str, Radians] = {}
+    quick_at: Seconds = inf
+
+
+class Body(ABC):
     """A robot, or a simulation of one. Its methods are called on the event loop and must not block.
 
     capabilities: what it can do, for planners: types of behaviors, joints and their limits.
@@ -275,18 +293,23 @@ class Body(Extras, ABC):
     replaces it.
     on_recovery: called with a sentence when something of which `on_fault` has told is over. Whoever runs the body
     replaces it.
+    carries: the parts that stand on another one and move with it, by that part. All of them are of one driver, or the
+    carrier is of none: nobody tells a driver how parts of another move.
+    others_say: tells what the voices of other drivers say now; empty: nothing. Who composes the body replaces it.
     on_lips: called by a voice with all the mouth shapes of what it begins to say, in time order, and with none when
     it falls silent early. Whoever runs the body replaces it.
     """
 
     Settings: ClassVar[type[Struct] | None] = None
     capabilities: Capabilities
+    carries: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    others_say: Callable[[], str] = staticmethod(lambda: "")
     on_fault: Callable[[Fault], None] = staticmethod(lambda fault: None)
     on_recovery: Callable[[str], None] = staticmethod(lambda text: None)
     on_lips: Callable[[Sequence[MouthShape]], None] = staticmethod(lambda shapes: None)
 
     @classmethod
-    def configured(cls, config: "ControlConfig", settings: Any) -> Self:
+    def configured(cls, config: ControlConfig, settings: Any) -> Self:
         """Make a body as the configuration says: with its settings as the one argument, if it has any.
 
         config: the whole section `control`. settings: a value of the type `Settings`; None: it has none.
@@ -303,7 +326,7 @@ class Body(Extras, ABC):
         """
         yield
 
-    def move_lips(self, shapes: Sequence[MouthShape]) -> None:
+    def move_lips(self, shapes: Sequence[MouthShape]) -> None:  # noqa: B027 - bodies without lips do nothing
         """Move the lips with a voice: replace all shapes that are to come. By default nothing.
 
         shapes: in time order; the last one closes the mouth. Empty: the voice has fallen silent.
@@ -393,3 +416,53 @@ class Body(Extras, ABC):
 
         world: all that is perceived, in metres.
         """
+
+    # -- what no body needs to have -----------------------------------------------------------------------------
+
+    @property
+    def faults(self) -> tuple[BodyFault, ...]:
+        """Faults that it plays now; a real body plays none."""
+        return ()
+
+    def switch_faults(self, faults: Sequence[BodyFault]) -> None:
+        """Play exactly these faults from now on, in what is under way, too. By default it can play none.
+
+        faults: each of a kind in `capabilities.faults`, with what `schemas.body_faults.KINDS` lets it have.
+
+        Raises:
+            InputRefused: it cannot play one of them, or not now. Nothing has changed.
+        """
+        if faults:
+            reason, advice = f"this body cannot play {faults[0].kind!r}", "only simulated bodies play faults"
+            raise InputRefused(Fault(reason=reason, where=faults[0].kind, advice=advice, service="control"))
+
+    def seen(self) -> Seen | None:
+        """Tell where a simulated body really looks and points, if that is not where it measures.
+
+        None: it is as it measures; and a real body, which everybody sees.
+        """
+        return None
+
+    def idle(self) -> Idle:
+        """Tell what it adds by itself to the posture of `state` now. None of it is in `state`, or in an estimate."""
+        return Idle()
+
+    def ray_at(self, part: str, pose: BodyPose) -> Ray | None:
+        """Tell where the gaze (`head`) or a forearm is with the joints so; None: it does not know.
+
+        part: `head`, `left_arm` or `right_arm`. pose: angles of all its joints, radians.
+        """
+        return None
+
+    def calibrate(self, offsets: Mapping[str, Radians]) -> None:
+        """Correct the angles of joints from now on: as told, asked for and estimated they are the true ones.
+
+        offsets: to be added to what a joint measures, by joint.
+
+        Raises:
+            InputRefused: it corrects none, or has no such joint. By default it corrects none.
+        """
+        if offsets:
+            reason = f"the body {self.capabilities.body} does not correct the angle of {', '.join(offsets)}"
+            advice = "leave [offsets] out of the calibration; its [errors] count all the same"
+            raise InputRefused(Fault(reason=reason, where="control.calibration", advice=advice, service="control"))

@@ -23,7 +23,7 @@ from engage_hri.schemas.body import Estimate, Ray
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.text import utf8
 from engage_hri.schemas.units import Degrees, Radians
-from engage_hri.services.control.contract.extras import Extras
+from engage_hri.services.control.contract.body import Body
 
 PARTS = ("head", "left_arm", "right_arm")
 """Parts that look or point."""
@@ -62,7 +62,7 @@ class Calibration(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         return replace(estimate, ray=self.widened(estimate.ray, part)) if estimate.ray and part else estimate
 
 
-def calibrated(body: Extras, file: str) -> Calibration:
+def calibrated(body: Body, file: str) -> Calibration:
     """Correct a body by a file, and return what is in it. file: empty: nothing changes. Raises InputRefused."""
     calibration = read(file)
     body.calibrate(calibration.radians)

@@ -1,4 +1,4 @@
-"""Idle motion of the torso: it blinks, breathes, and its face is never quite still. Pure.
+"""Idle motion of a figure: it blinks, breathes, its face stirs, and its lips go with its voice. Pure.
 
 All of it is added to the posture that behaviors give it, and enters no estimate, no pose after a behavior, and
 nothing that a behavior does or waits in: breath gives way to any motion and any hold of the body, the face to any
@@ -7,13 +7,17 @@ same.
 """
 
 import math
-from collections.abc import Mapping
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
 from math import inf, radians, sin, tau
 
 from engage_hri.schemas.units import Radians, Seconds
-from engage_hri.services.control.contract.extras import Gate, smooth
+from engage_hri.services.control.contract.body import MouthShape
 from engage_hri.services.control.contract.variability import chance, normal
 
+GIVES_WAY: Seconds = 0.2
+COMES_BACK: Seconds = 1.5
+"""Seconds in which idle motion stops for a behavior, and in which it comes back."""
 BETWEEN_BLINKS: Seconds = 60.0 / 17.0
 """Mean of the time between two blinks: at rest people blink 17 times a minute (Bentivoglio et al., Movement Disorders
 12, 1997; rates are log-normal there, and so are the times between blinks here)."""
@@ -32,6 +36,31 @@ STIRRING: Mapping[str, tuple[float, Seconds, Seconds]] = {
     "right_mouth_corner": (0.03, 9.1, 5.3), "lips": (0.015, 6.1, 3.7),
 }  # fmt: skip
 """Amplitude and the two periods of the motion of each joint of the face, as shares of its way."""
+
+
+class Gate:
+    """Share of the idle motion that is let through: it goes to 0 when something begins, and comes back after it."""
+
+    def __init__(self, *, is_open: bool = True) -> None:
+        self._since: Seconds = -inf
+        self._from = float(is_open)
+        self._is_open = is_open
+
+    def share(self, t: Seconds, *, is_open: bool) -> float:
+        """The share at t, of a gate that is open or closed from now on."""
+        if is_open != self._is_open:
+            self._from, self._since, self._is_open = self._at(t), t, is_open
+        return self._at(t)
+
+    def _at(self, t: Seconds) -> float:
+        seconds = COMES_BACK if self._is_open else GIVES_WAY
+        return self._from + (float(self._is_open) - self._from) * smooth((t - self._since) / seconds)
+
+
+def smooth(done: float) -> float:
+    """Way of a movement of least jerk, 0 to 1, when this share of its time is over."""
+    x = min(max(done, 0.0), 1.0)
+    return x * x * x * (10.0 + x * (6.0 * x - 15.0))
 
 
 class Blinks:
@@ -98,3 +127,59 @@ def closure(since: Seconds) -> float:
     if since < CLOSING:
         return smooth(since / CLOSING)
     return 1.0 - smooth((since - CLOSING - CLOSED) / OPENING)
+
+
+CHANGE: Seconds = 0.09
+"""Seconds in which the lips go from one shape to the next, half of them before the next begins, as people's do: as
+quickly as the joints of the face may."""
+OPEN, PARTED, WIDENED = 0.7, 0.8, 0.35
+"""Shares of the way left that jaw and lips take when the mouth is wide open, and its corners when it is spread."""
+Shape = tuple[float, float]
+
+
+class Mouth:
+    """The shapes that the lips go through. With new ones it leaves those before where it is."""
+
+    def __init__(self) -> None:
+        self._shapes: tuple[MouthShape, ...] = ()
+        self._times: list[Seconds] = []
+        self._left: Shape = (0.0, 0.0)
+        self._since: Seconds = 0.0
+
+    def move(self, shapes: Sequence[MouthShape], now: Seconds) -> None:
+        """Go through these shapes from now on, and through no others. Empty: close."""
+        self._left, self._since = self.at(now), now
+        # What has begun already begins now; what comes later is led up to.
+        self._shapes = tuple(MouthShape(max(each.at, now + CHANGE / 2), each.opening, each.width) for each in shapes)
+        self._times = [each.at for each in self._shapes]
+
+    def at(self, t: Seconds) -> Shape:
+        """Opening and width at t."""
+        gone = 1.0 - smooth((t - self._since) / CHANGE)
+        opening, width = gone * self._left[0], gone * self._left[1]
+        # Changes that overlap add up; those before `first` are over.
+        first = max(0, bisect_right(self._times, t - CHANGE / 2) - 1)
+        before = (0.0, 0.0)
+        for number in range(first, len(self._shapes)):
+            each = self._shapes[number]
+            come = smooth((t - each.at) / CHANGE + 0.5)
+            if come <= 0.0:
+                break
+            opening += come * (each.opening - before[0])
+            width += come * (each.width - before[1])
+            before = (each.opening, each.width)
+        return opening, width
+
+    def is_moving(self, t: Seconds) -> bool:
+        """True while the lips move, or are about to."""
+        return t < self._since + CHANGE or bool(self._times and t < self._times[-1] + CHANGE / 2)
+
+    def added(self, t: Seconds, face: Mapping[str, float]) -> dict[str, float]:
+        """Tell what is added to the joints of the mouth. face: its joints as an expression has them: its rest."""
+        opening, width = self.at(t)
+        if not (opening or width):
+            return {}
+        by = {"jaw": OPEN * opening * (1.0 - face["jaw"]), "lips": PARTED * opening * (1.0 - face["lips"])}
+        for corner in ("left_mouth_corner", "right_mouth_corner"):
+            by[corner] = WIDENED * width * (1.0 - abs(face[corner]))
+        return by

@@ -37,10 +37,18 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import expressions, kinematics
 from engage_hri.services.control.figure.aiming import TRUNK, Aim
-from engage_hri.services.control.figure.course import Course, Situation, angles, course, marks
+from engage_hri.services.control.figure.course import (
+    Course,
+    Situation,
+    angles,
+    arm_time,
+    course,
+    marks,
+    return_time,
+    turning_time,
+)
 from engage_hri.services.control.figure.expressions import SETTLE, sides
 from engage_hri.services.control.figure.kinematics import Side, Unreachable
-from engage_hri.services.control.figure.pace import arm_time, return_time, turning_time
 from engage_hri.services.control.motion.path import Leg
 from engage_hri.services.control.motion.points import WalkPoint, held_around_stroke, held_on_target
 
@@ -222,11 +230,6 @@ def lowering(here: tuple[float, ...], home: tuple[float, ...]) -> Leg:
     """Leg of an arm from a target back to where it belongs."""
     seconds = max(0.4, return_time(here, home))
     return Leg(goal=home, seconds=seconds, marks=(("relax", 0.1 / seconds), ("end", 1.0)))
-
-
-def is_shift(behavior: BlockBehavior) -> bool:
-    """True for a shift of the head: it says where the head belongs when no look lies over it."""
-    return isinstance(behavior, GazeShift | HeadDirectionShift)
 
 
 def eye_target(behavior: BlockBehavior | None) -> str:

@@ -1,28 +1,25 @@
-"""A behavior worked out for the simulated torso: where its joints go, and its sync points on the way."""
+"""A behavior worked out for a figure: where its joints go, its sync points on the way, and how long a way takes."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from msgspec import Struct
 
 from engage_hri.schemas.body import NoPointZone, Ray
+from engage_hri.schemas.units import Degrees, Seconds
 from engage_hri.schemas.world import World
+from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.figure.aiming import UPRIGHT, Aim
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
 from engage_hri.services.control.motion.path import Leg
-from engage_hri.services.control.motion.points import WalkPoint
+from engage_hri.services.control.motion.points import MotionPlan, WalkPoint
 from engage_hri.services.control.motion.track import Trunk
 
 
-class Course(Struct, frozen=True, kw_only=True):
-    """A behavior worked out: `legs` for `joints` from where they are, and its sync points in order."""
+class Course(MotionPlan, frozen=True, kw_only=True):
+    """A motion plan of a figure: it may aim at a place, and its trunk may move meanwhile."""
 
-    parts: tuple[str, ...]
-    joints: tuple[str, ...]
-    legs: tuple[Leg, ...]
-    points: tuple[WalkPoint, ...]
-    on_target: Mapping[str, float] = {}
-    """Joint angles at the stroke, or at the end of a shift."""
     ray: Ray | None = None
     is_resizable: bool = False
     """True if it may be made smaller for want of time; false for a motion with a target."""
@@ -30,23 +27,6 @@ class Course(Struct, frozen=True, kw_only=True):
     """The place that it is on from its beginning until it leaves its target: the trunk may move meanwhile."""
     trunks: tuple[Trunk, ...] = (UPRIGHT,)
     """Places where the trunk may be while arms move along it. A course that moves the trunk itself needs none."""
-    note: str = ""
-    """Warning, if this is only the nearest to what was asked: names both."""
-
-    @property
-    def arrival(self) -> str:
-        """The sync point that says that a behavior has come to its target."""
-        return "stroke" if any(point.sync == "stroke" for point in self.points) else "end"
-
-    @property
-    def stays(self) -> bool:
-        """True for a shift: it goes nowhere from its goal."""
-        return len(self.points) == 2
-
-    @property
-    def goal(self) -> tuple[float, ...]:
-        """Angles of its joints on target."""
-        return tuple(self.on_target.values())
 
 
 class Situation(Struct, frozen=True):
@@ -93,3 +73,42 @@ def marks(fraction: float, *syncs: str) -> tuple[tuple[str, float], ...]:
 
 def angles(joints: tuple[str, ...], pose: Mapping[str, float]) -> tuple[float, ...]:
     return tuple(pose[joint] for joint in joints)
+
+
+LEAST_TURN = 0.3
+"""Degrees: a gaze that would turn less does not move."""
+LEAST_LEAN = 0.8
+"""Degrees: a torso that has less to go stays; twice what it drifts on target."""
+LEAST_FACE = 0.04
+"""A face that has less to go stays. A share of its joints' ranges."""
+
+
+def turning_time(start: Sequence[float], goal: Sequence[float]) -> Seconds:
+    """Natural duration of a turn of the head: 0.3 s for 30 degrees, 0.5 s for 60, nothing for none."""
+    turn = kinematics.degrees_between(start, goal)
+    return 0.0 if turn < LEAST_TURN else 0.1 + turn / 150.0
+
+
+def return_time(start: Sequence[float], goal: Sequence[float]) -> Seconds:
+    """Natural duration of the way home of an arm, the torso or a face."""
+    way = kinematics.degrees_between(start, goal)
+    return 0.0 if way < 0.01 else 0.3 + max(abs(math.degrees(b - a)) for a, b in zip(start, goal, strict=True)) / 120
+
+
+def arm_time(start: Sequence[float], goal: Sequence[float], least: Seconds, speed: Degrees) -> Seconds:
+    return max(least, 0.15 + max(abs(math.degrees(b - a)) for a, b in zip(start, goal, strict=True)) / speed)
+
+
+def moving_time(joints: Sequence[str], start: Sequence[float], goal: Sequence[float]) -> Seconds:
+    """Natural duration of the way to an expression of the face or to a posture; nothing if it is hardly any way."""
+    ways = {joint: abs(b - a) for joint, a, b in zip(joints, start, goal, strict=True)}
+    if kinematics.LIMIT[joints[0]].part == "face":
+        return max(map(_face_time, ways, ways.values())) if max(ways.values()) >= LEAST_FACE else 0.0
+    return 0.0 if math.degrees(sum(ways.values())) < LEAST_LEAN else 2 * return_time(start, goal)
+
+
+def _face_time(joint: str, way: float) -> Seconds:
+    """Natural duration of the way of one joint of the face. A lid is as quick as a person's: a blink takes 0.24 s."""
+    if way < LEAST_FACE:
+        return 0.0
+    return 0.05 + 0.06 * way if joint.endswith("_lid") else 0.15 + 0.25 * way

@@ -21,9 +21,17 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import kinematics
-from engage_hri.services.control.figure.course import Course, Situation, angles, course, marks
+from engage_hri.services.control.figure.course import (
+    Course,
+    Situation,
+    angles,
+    arm_time,
+    course,
+    marks,
+    moving_time,
+    return_time,
+)
 from engage_hri.services.control.figure.kinematics import Side
-from engage_hri.services.control.figure.pace import arm_time, moving_time, return_time
 from engage_hri.services.control.figure.repertoire import Absent, Found, GesturePath, HeadPath, Table
 from engage_hri.services.control.figure.tracks import clear_of_table
 from engage_hri.services.control.motion.path import Leg

@@ -1,6 +1,6 @@
-"""The torso with physics: it moves along the plans of the simulated torso, as far as its motors can.
+"""The torso with physics: a figure that moves along its plans as far as its motors can.
 
-The plan of each part is that of `control.torso`; servos follow it, in MuJoCo. A sync point is reported once the plan
+The plan of each part is that of `control.figure`; servos follow it, in MuJoCo. A sync point is reported once the plan
 has come there *and the measured joints are there*. The plan waits for joints that lag, and a behavior whose joints
 make no way any more fails with the name of the joint. The face is a screen: it is where its plan has it.
 """
@@ -22,10 +22,11 @@ from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.bases.watch import Off, Watch, farthest, nearest
 from engage_hri.services.control.config import ControlConfig, Variability
-from engage_hri.services.control.contract.body import Body, BodyFailed, BodyState, MovementAuthority, Progress
-from engage_hri.services.control.contract.extras import Idle, Seen
-from engage_hri.services.control.figure import kinematics, tracks
+from engage_hri.services.control.contract.body import Body, BodyFailed, Idle, MovementAuthority, Progress
+from engage_hri.services.control.figure import tracks
+from engage_hri.services.control.figure.body import FigureBody
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire, repertoire_of
+from engage_hri.services.control.figure.runs import Run
 from engage_hri.services.control.figure.tracks import PartTrack
 from engage_hri.services.control.motion.points import WalkPoint
 from engage_hri.services.control.mujoco.described import DescribedBody
@@ -34,8 +35,6 @@ from engage_hri.services.control.mujoco.film import Frame, filming, framed
 from engage_hri.services.control.mujoco.pulse import TICK
 from engage_hri.services.control.mujoco.settings import MujocoSettings
 from engage_hri.services.control.mujoco.stage import Workbench, as_measured
-from engage_hri.services.control.torso.body import SimulatedBody, seen_with
-from engage_hri.services.control.torso.runs import Run
 
 NEAR: Mapping[str, Radians] = {
     "head": math.radians(0.6), "nod": math.radians(0.6), "torso": math.radians(0.8), "left_arm": math.radians(1.5),
@@ -49,8 +48,8 @@ LAG: Mapping[str, Radians] = {
 """Radians by which a joint of a part may lag behind its plan before the plan waits."""
 
 
-class MujocoBody(SimulatedBody):
-    """The torso of `SimulatedBody` as a physics model at a table. Estimates are of the healthy body."""
+class MujocoBody(FigureBody):
+    """The figure as a physics model at a table. Estimates are of the healthy body."""
 
     Settings = MujocoSettings
 
@@ -69,12 +68,10 @@ class MujocoBody(SimulatedBody):
 
         Raises InputRefused: a deviation, a fault or a film that cannot be had.
         """
-        super().__init__(zones, deviations, repertoire, alive=alive)
+        super().__init__("mujoco", KINDS, zones, deviations, repertoire, alive=alive)
         self._settings = settings or MujocoSettings()
         joints = tuple(as_measured(each, 1.3, 4.0) for each in self.capabilities.joints)
-        self.capabilities = replace(
-            self.capabilities, body="mujoco", joints=joints, faults=KINDS, fault_kinds=told(OURS)
-        )
+        self.capabilities = replace(self.capabilities, joints=joints, fault_kinds=told(OURS))
         self.bench = Workbench(lambda now: tracks.pose_at(self.moves.tracks, now), self._look, self._settings.seed)
         self.pulse = self.bench.pulse
         self._watches: dict[Run, Watch] = {}
@@ -129,7 +126,7 @@ class MujocoBody(SimulatedBody):
             return until
         now, names = self._loop.time(), [name for name in tracks.LIMITS if name != "nod" and name in going]
         off = self._off_plan(names, now)
-        if off.share <= 1.0 and not self._are_moving(names):
+        if off.share <= 1.0 and not self.are_moving(names):
             return None
         watches["home"].see(off, now)
         if off.share > 1.0 and watches["home"].is_stuck:
@@ -137,25 +134,31 @@ class MujocoBody(SimulatedBody):
         self.pulse.wake()
         return now + TICK
 
-    def state(self) -> BodyState:
-        self.pulse.step()
-        now, pose = self._loop.time(), self._measured()
-        arms = kinematics.arm(pose, "left"), kinematics.arm(pose, "right")
-        looked = self.moves.attention.fixated(now)
-        return BodyState(
-            pose=kinematics.pose_message(pose), gaze=kinematics.gaze(pose), left_arm=arms[0], right_arm=arms[1],
-            moving=self._voice.is_busy or self._are_moving(tracks.LIMITS),
-            looking_at=looked if self._rests_on(looked) else "",
-            speaking=self._voice.saying,
-        )  # fmt: skip
-
     def see(self, world: World) -> None:
         self.pulse.step()
         super().see(world)
         self.bench.room.lay(world)
         self.pulse.wake()
 
-    # -- what it does not measure -------------------------------------------------------------------------------
+    # -- measurements -------------------------------------------------------------------------------------------
+
+    def measured(self) -> dict[str, Radians]:
+        """Tell the measured angle of each joint; of the face, where it is shown."""
+        self.pulse.step()
+        return {**self.planned(), **self.bench.measured}
+
+    def beside(self) -> Mapping[str, Radians]:
+        return self.bench.physics.beside
+
+    def are_moving(self, names: Iterable[str]) -> bool:
+        """True if these tracks move, by their plan or by what is measured."""
+        joints, quick = {each for name in names for each in self.moves.tracks[name].joints}, self.bench.physics.quick
+        return super().are_moving(names) or not quick.isdisjoint(joints)
+
+    def looking_at(self) -> str:
+        """Id of the entity on which the measured eyes rest, which are where the plan has them."""
+        looked, now = super().looking_at(), self._loop.time()
+        return looked if not looked or self._off_plan(("head", "torso"), now).share < 2.0 else ""
 
     def idle(self) -> Idle:
         """Tell what the screen shows by itself. No motor breathes: none of that would be in the physics."""
@@ -165,12 +168,8 @@ class MujocoBody(SimulatedBody):
 
     def _face(self) -> dict[str, float]:
         """The planned angle of each joint, and what the face does by itself: as a film shows it."""
-        plan, added = self._plan(), self.idle().added
+        plan, added = self.planned(), self.idle().added
         return {joint: angle + added.get(joint, 0.0) for joint, angle in plan.items()}
-
-    def seen(self) -> Seen | None:
-        self.pulse.step()
-        return seen_with(self._measured(), self.bench.physics.beside)
 
     def calibrate(self, offsets: Mapping[str, Radians]) -> None:
         super().calibrate(offsets)
@@ -191,20 +190,6 @@ class MujocoBody(SimulatedBody):
         self.bench.suffer(ours)
 
     # -- steps --------------------------------------------------------------------------------------------------
-
-    def _plan(self) -> dict[str, float]:
-        """The planned angle of each joint now."""
-        return tracks.pose_at(self.moves.tracks, self._loop.time())
-
-    def _measured(self) -> dict[str, float]:
-        """The measured angle of each joint; of the face, where it is shown."""
-        return {**self._plan(), **self.bench.measured}
-
-    def _are_moving(self, parts: Iterable[str]) -> bool:
-        """True if these parts move, by their plan or by what is measured."""
-        going = [self.moves.tracks[part] for part in parts]
-        now, quick = self._loop.time(), self.bench.physics.quick
-        return any(track.is_moving(now) or not quick.isdisjoint(track.joints) for track in going)
 
     def _look(self, now: Seconds) -> bool:
         """Look at what has come of a step. True: everything is at rest."""
@@ -249,8 +234,6 @@ class MujocoBody(SimulatedBody):
         motion.brake(now, min(stop, motion.limit))
 
     async def come(self, run: Run, point: WalkPoint, due: Seconds) -> Seconds | None:
-        if not point.is_told:
-            return await super().come(run, point, due)
         self.pulse.step()
         now = self._loop.time()
         if self.has_come(run, point):
@@ -318,10 +301,6 @@ class MujocoBody(SimulatedBody):
             return {}
         other = self.moves.tracks["nod" if track.name == "head" else "head"]
         return dict(zip(other.joints, other.angles(now), strict=True))
-
-    def _rests_on(self, looked: str) -> bool:
-        """True if the measured eyes are where the plan has them."""
-        return not looked or self._off_plan(("head", "torso"), self._loop.time()).share < 2.0
 
     def _stuck(self, where: str, watch: Watch) -> Fault:
         """Describe joints that do not come: which one, how far it is off, and what is known of its motor."""

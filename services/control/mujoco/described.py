@@ -17,19 +17,17 @@ from engage_hri.schemas.body_faults import BodyFault, refuse
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.bases.composed import ComposedBody, Member
+from engage_hri.services.control.bases.walk import wait
 from engage_hri.services.control.contract.body import Body, MovementAuthority, Progress
 from engage_hri.services.control.figure.estimates import wait_estimate
-from engage_hri.services.control.mujoco.description import ArmDescription, Description, read
 from engage_hri.services.control.mujoco.faults import OURS, told
 from engage_hri.services.control.mujoco.film import Frame, filming, framed
 from engage_hri.services.control.mujoco.ik import Chain
 from engage_hri.services.control.mujoco.limbs import ArmLimb, HeadLimb, Limb
-from engage_hri.services.control.mujoco.motors import Motor
-from engage_hri.services.control.mujoco.physics import Physics
-from engage_hri.services.control.mujoco.robot import PREFIX, assembled
+from engage_hri.services.control.mujoco.physics import Motor, Physics
+from engage_hri.services.control.mujoco.robot import PREFIX, ArmDescription, Description, assembled, read
 from engage_hri.services.control.mujoco.settings import MujocoSettings
 from engage_hri.services.control.mujoco.stage import DescribedStage, as_measured, limits_of
-from engage_hri.services.control.voice import speaking
 from engage_hri.services.runtime.steps import Steps
 from engage_hri.services.tangram.table import tangram_table
 
@@ -88,9 +86,7 @@ class DescribedBody(ComposedBody):
     async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
         if (preparing := self.prepare([behavior])) is not None:
             await preparing
-        performed = (
-            speaking.wait(behavior, authority) if isinstance(behavior, Wait) else super().perform(behavior, authority)
-        )
+        performed = wait(behavior, authority) if isinstance(behavior, Wait) else super().perform(behavior, authority)
         async with aclosing(performed) as stream:
             async for progress in stream:
                 yield progress

@@ -12,7 +12,7 @@ from engage_hri.schemas.body import FaultKind
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.units import Vector
 from engage_hri.services.control.mujoco.model import AWAY, OBSTACLES
-from engage_hri.services.control.mujoco.motors import WARM, Condition, Motor
+from engage_hri.services.control.mujoco.physics import WARM, Condition, Motor
 
 SHARED = ("displaced", "mute", "voiceless", "lost")
 """Kinds that the simulated torso plays for it."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from engage_hri.schemas.body import Ray
 from engage_hri.schemas.units import Meters, Radians, Vector
-from engage_hri.services.control.mujoco.description import Place
+from engage_hri.services.control.mujoco.robot import Place
 from engage_hri.services.runtime.steps import Steps
 
 Array = NDArray[np.float64]

@@ -1,8 +1,8 @@
 """Parts of a described robot, each an ordinary body of one part: where it looks or points, by inverse kinematics."""
 
 import math
-from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping, Sequence
-from contextlib import aclosing, suppress
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 
 from msgspec.structs import replace
@@ -16,13 +16,9 @@ from engage_hri.services.control.bases.one_part_motion import OrdinaryBody, Way,
 from engage_hri.services.control.contract.bell import Bell
 from engage_hri.services.control.contract.body import (
     BehaviorRefused,
-    BodyFailed,
     BodyState,
-    MovementAuthority,
-    Progress,
-    Reached,
+    Seen,
 )
-from engage_hri.services.control.contract.extras import Seen
 from engage_hri.services.control.figure.kinematics import HAND_TO_TARGET, TABLE_TOP
 from engage_hri.services.control.mujoco.ik import ON_AXIS, Chain, Solution
 from engage_hri.services.control.mujoco.stage import Angles, DescribedStage
@@ -83,15 +79,8 @@ class Limb(OrdinaryBody):
     def go(self, goal: Angles, seconds: Seconds) -> None:
         self.stage.go(self.part, goal, seconds)
 
-    async def _move(
-        self, goal: Callable[[], Angles], authority: MovementAuthority | None, sync: str
-    ) -> Seconds | None:
-        try:
-            return await super()._move(goal, authority, sync)
-        except BodyFailed as failed:
-            joint = failed.fault.reason.partition(" ")[0]
-            known = self.stage.suspicion(joint)
-            raise BodyFailed(replace(failed.fault, advice=known or failed.fault.advice)) from failed
+    def suspicion(self, joint: str, *, is_other_way: bool) -> str:
+        return self.stage.suspicion(joint) or super().suspicion(joint, is_other_way=is_other_way)
 
     async def home(self, parts: tuple[str, ...] = ()) -> None:
         await super().home(parts)
@@ -135,7 +124,7 @@ class Limb(OrdinaryBody):
         """The next aim of a behavior that is not solved; None: all are, or it cannot be done."""
         self._is_ahead = True
         try:
-            self.way(behavior, self.world)
+            self.way(behavior, self.moves.world)
         except _Unsolved as aim:
             return aim
         except BehaviorRefused:
@@ -166,7 +155,7 @@ class Limb(OrdinaryBody):
         self, behavior: BlockBehavior, target: Vector, floor: Meters = -math.inf, distance: Meters = 0.0
     ) -> Angles:
         """Angles on a target, each time a mapping of their own. Raises BehaviorRefused: it finds none."""
-        found = self.solved(target, self._home, floor, distance)
+        found = self.solved(target, self.moves.home, floor, distance)
         if found.low > 2e-3:
             raise refused(behavior, f"the {self.part} finds no way to it: the table is in the way, or it is too near")
         if found.off > ON_AXIS:
@@ -213,7 +202,7 @@ class HeadLimb(Limb):
 
     def _beside(self, behavior: BlockBehavior, yaw: Radians, pitch: Radians) -> Angles:
         """Angles at which the eyes look beside where they belong."""
-        base = self.axis(self._base)
+        base = self.axis(self.moves.goal)
         x, y, z = base.axis
         heading, height = math.atan2(y, x) + yaw, math.asin(max(-1.0, min(1.0, z))) + pitch
         axis = (math.cos(height) * math.cos(heading), math.cos(height) * math.sin(heading), math.sin(height))
@@ -222,23 +211,14 @@ class HeadLimb(Limb):
 
 
 class ArmLimb(Limb):
-    """An arm: it points with its forearm. points_at: id of what it points at now; empty: nothing."""
+    """An arm: it points with its forearm."""
 
-    points_at = ""
-
-    async def _move(
-        self, goal: Callable[[], Angles], authority: MovementAuthority | None, sync: str
-    ) -> Seconds | None:
-        if sync not in ("stroke", "stroke_end"):
-            self.points_at = ""
-        return await super()._move(goal, authority, sync)
-
-    async def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-        async with aclosing(super().perform(behavior, authority)) as stream:
-            async for progress in stream:
-                if isinstance(progress, Reached) and progress.sync == "stroke":
-                    self.points_at = getattr(behavior, "target", "")
-                yield progress
+    @property
+    def points_at(self) -> str:
+        """Id of what it points at now; empty: nothing."""
+        run = self.moves.runs.get(self.part)
+        is_on = run is not None and run.awaits("stroke_end") and not run.awaits("stroke")
+        return getattr(run.behavior, "target", "") if run is not None and is_on else ""
 
     def aim(self, behavior: BlockBehavior, world: World) -> Angles:
         target = self.position(behavior, world)

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 
 from engage_hri.schemas.units import Meters, Seconds, Vector
 from engage_hri.services.control.figure import kinematics
-from engage_hri.services.control.mujoco.motors import Motor
+from engage_hri.services.control.mujoco.physics import Motor
 from engage_hri.services.tangram.table import Piece, TangramTable
 
 STEP: Seconds = 0.002

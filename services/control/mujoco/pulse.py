@@ -4,8 +4,8 @@ import asyncio
 from collections.abc import Awaitable, Callable
 
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.runtime.loop import unhurried
 from engage_hri.services.runtime.steps import Steps
-from engage_hri.services.runtime.unhurried import unhurried
 
 TICK: Seconds = 0.01
 """Seconds from one command to the servos to the next."""

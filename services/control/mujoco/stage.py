@@ -18,10 +18,10 @@ from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import Leg, Path
 from engage_hri.services.control.motion.track import Place, Track
 from engage_hri.services.control.mujoco import faults, model
-from engage_hri.services.control.mujoco.description import Description, PartDescription
 from engage_hri.services.control.mujoco.model import THICKNESS
 from engage_hri.services.control.mujoco.physics import Array, Contact, Physics
 from engage_hri.services.control.mujoco.pulse import Pulse
+from engage_hri.services.control.mujoco.robot import Description, PartDescription
 from engage_hri.services.tangram.table import tangram_table
 
 MOVED: Meters = 0.01

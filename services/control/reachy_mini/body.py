@@ -25,17 +25,16 @@ from engage_hri.services.control.contract.body import (
     BehaviorRefused,
     BodyFailed,
     BodyState,
+    Idle,
     MovementAuthority,
 )
-from engage_hri.services.control.contract.extras import Idle
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import choreography
 from engage_hri.services.control.figure.estimates import wait_estimate
 from engage_hri.services.control.motion.points import WalkPoint
-from engage_hri.services.control.reachy_mini import courses, joints, messages
+from engage_hri.services.control.reachy_mini import courses, joints, link
 from engage_hri.services.control.reachy_mini.idling import Idling
-from engage_hri.services.control.reachy_mini.link import GAP, Connect, Daemon, LinkedBody
-from engage_hri.services.control.reachy_mini.messages import Measured
+from engage_hri.services.control.reachy_mini.link import GAP, Connect, Daemon, LinkedBody, Measured
 from engage_hri.services.control.reachy_mini.moves import Moves, Run
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 
@@ -66,7 +65,7 @@ class ReachyMini(LinkedBody, WalkingBody[Run]):
             body="reachy_mini", types=tuple(map(type_name, courses.TYPES)), parts=("head", "torso", "face"),
             joints=joints.LIMITS,
         )  # fmt: skip
-        self.patience = self.settings.patience
+        self.stuck_after = self.settings.patience
         self.moves = Moves(self._loop, self.settings)
         self._idling = Idling(self.settings.lag, is_alive=alive)
         self._sent = ""
@@ -86,7 +85,7 @@ class ReachyMini(LinkedBody, WalkingBody[Run]):
         commanded = moves.commanded(now)
         busy = {name for name, track in moves.tracks.items() if name in moves.runs or track.is_moving(now)}
         added = self._idling.added(now, commanded, busy)
-        text = messages.target({joint: angle + added.get(joint, 0.0) for joint, angle in commanded.items()})
+        text = link.target({joint: angle + added.get(joint, 0.0) for joint, angle in commanded.items()})
         before, self._sent = self._sent, text
         return text if text != before else None
 
@@ -133,7 +132,7 @@ class ReachyMini(LinkedBody, WalkingBody[Run]):
         if self.trouble is not None:
             raise BehaviorRefused(replace(self.trouble, where=behavior.id))
         course = courses.course(behavior, self.moves.circumstances(self.moves.world))
-        return self.moves.set_out(Run(behavior, course, authority, self.patience))
+        return self.moves.set_out(Run(behavior, course, authority, self.stuck_after))
 
     def check(self, run: Run) -> None:
         if self.trouble is not None and (run.authority.revoked is None or not self.moves.owns(run)):
@@ -191,7 +190,7 @@ class ReachyMini(LinkedBody, WalkingBody[Run]):
         now = self._loop.time()
         ends = {name: track.motion.end for name, track in self.moves.tracks.items()}
         return any(
-            now < end + self.settings.lag or (now < end + self.patience and self._off_home(name).share > 1.0)
+            now < end + self.settings.lag or (now < end + self.stuck_after and self._off_home(name).share > 1.0)
             for name, end in ends.items()
         )
 

@@ -9,8 +9,7 @@ from collections import deque
 from math import inf, radians, sin, tau
 
 from engage_hri.schemas.units import Radians, Seconds
-from engage_hri.services.control.contract.extras import Gate
-from engage_hri.services.control.figure.alive import BREATH
+from engage_hri.services.control.figure.alive import BREATH, Gate
 from engage_hri.services.control.reachy_mini import joints
 from engage_hri.services.control.reachy_mini.joints import Angles
 

@@ -24,8 +24,8 @@ from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.contract.calibration import Calibration
 from engage_hri.services.control.serving.intake import ControlIntake
 from engage_hri.services.control.serving.words_for_voice import estimate_of, spoken, spoken_items
+from engage_hri.services.runtime.loop import InTurns
 from engage_hri.services.runtime.steps import Steps
-from engage_hri.services.runtime.unhurried import InTurns
 
 ADVICE = "phases lead from `start` to `end`, each from where the one before it ends (docs/control.md)"
 ROUNDING: Seconds = 1e-6

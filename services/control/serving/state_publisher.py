@@ -9,10 +9,9 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.body import BodyPose, JointAngle, RobotSeen, RobotState
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.control.contract.body import Body
+from engage_hri.services.control.contract.body import Body, Idle, Seen
 from engage_hri.services.control.contract.calibration import Calibration
-from engage_hri.services.control.contract.extras import Idle, Seen
-from engage_hri.services.runtime.alarm import Timer
+from engage_hri.services.runtime.loop import Timer
 
 IDLE: Seconds = 1.0
 """Interval of `RobotState` messages while nothing moves."""

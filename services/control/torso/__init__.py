@@ -1,1 +1,1 @@
-"""The simulated torso: a body whose motion is computed in closed form, with configured faults."""
+"""The torso as a formula: the driver `simulated`, whose joints are where their plan has them but for its faults."""

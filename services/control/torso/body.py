@@ -1,61 +1,23 @@
-"""The simulated body: the torso of `kinematics` on loop time, with the faults that are switched on.
+"""The simulated body: a figure whose joints are where the plan has them, but for faults that are scripted."""
 
-The position of each part at an instant is a formula (`tracks`, `motion`); a behavior's task only sleeps until its
-next sync point, or until its authority changes. So a part needs no task to go home: it is given its path once.
-"""
-
-from collections.abc import AsyncGenerator, Mapping, Sequence
-from contextlib import aclosing
+from collections.abc import Mapping
 from math import inf, radians
 from typing import Self
 
-from engage_hri.schemas.behaviors import BlockBehavior, Speech, Wait
-from engage_hri.schemas.body import BodyPose, Capabilities, Estimate, EstimateItem, NoPointZone, Ray
-from engage_hri.schemas.body_faults import KINDS, BodyFault, refuse
-from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.references import type_name
+from engage_hri.schemas.body import NoPointZone
+from engage_hri.schemas.body_faults import KINDS
 from engage_hri.schemas.units import Radians, Seconds
-from engage_hri.schemas.world import World
-from engage_hri.services.control.bases.walk import WalkingBody
 from engage_hri.services.control.config import ControlConfig, Variability
-from engage_hri.services.control.contract import variability
-from engage_hri.services.control.contract.body import (
-    BehaviorRefused,
-    BodyFailed,
-    BodyState,
-    MouthShape,
-    MovementAuthority,
-    Progress,
-    Reached,
-)
-from engage_hri.services.control.contract.extras import Idle, Seen
-from engage_hri.services.control.contract.refusals import Impossible
-from engage_hri.services.control.contract.variability import Deviations
-from engage_hri.services.control.figure import choreography, kinematics, tracks
-from engage_hri.services.control.figure.alive import Alive
-from engage_hri.services.control.figure.estimates import beneath_a_look, wait_estimate
+from engage_hri.services.control.contract.body import BodyFailed
+from engage_hri.services.control.figure import kinematics
+from engage_hri.services.control.figure.body import FigureBody, fault
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire, repertoire_of
+from engage_hri.services.control.figure.runs import OVERHEAT, STALL, Run
 from engage_hri.services.control.motion.points import WalkPoint
-from engage_hri.services.control.torso.mouth import Mouth
-from engage_hri.services.control.torso.rehearsal import ClockOfCopy, beside, rehearsed
-from engage_hri.services.control.torso.runs import OVERHEAT, STALL, Run
-from engage_hri.services.control.torso.torso import Torso
-from engage_hri.services.control.voice.speaker import Voice, speech_estimate
-from engage_hri.services.control.voice.speaking import speak
-from engage_hri.services.control.voice.timeline import uttered
-from engage_hri.services.runtime.steps import Steps, finished
-
-FAULTS = tuple(KINDS)
-"""Kinds of faults that it can play: all that have a name."""
-ELEMENTS = 256
-"""Elements that an estimate with a path counts for (see `steps`)."""
 
 
-class SimulatedBody(WalkingBody[Run]):
+class SimulatedBody(FigureBody):
     """A simulated torso with a voice. Behaviors take as long as `estimate` says, but for its faults."""
-
-    carries = kinematics.CARRIES
-    moves: Torso
 
     def __init__(
         self,
@@ -66,179 +28,18 @@ class SimulatedBody(WalkingBody[Run]):
         alive: bool = False,
     ) -> None:
         """Make a torso at rest, in a running event loop. alive: it blinks and breathes. Raises InputRefused."""
-        super().__init__()
-        self.capabilities = Capabilities(
-            body="simulated", types=tuple(map(type_name, choreography.TYPES)), parts=(*kinematics.PARTS, "voice"),
-            joints=kinematics.JOINTS, reach=kinematics.REACH, no_point_zones=zones, faults=FAULTS,
-        )  # fmt: skip
-        self._deviations = variability.configured(deviations or Variability())
-        refuse(self._deviations.faults, self.capabilities, "control.variability")
-        self.moves = Torso(self._loop, zones, repertoire, _displaced(self._deviations.faults))
-        self._voice = Voice(is_mute=bool(self._deviations.of("mute")))
-        self._occasions = 0
-        self._alive = Alive(self._deviations.seed, self._loop.time()) if alive else None
-        self._mouth = Mouth()
-        self.on_lips = self.move_lips
-        self._offsets: dict[str, float] = {}
-        """Radians by which the true angle of a joint is more than what it measures, as its calibration says."""
+        super().__init__("simulated", tuple(KINDS), zones, deviations, repertoire, alive=alive)
 
     @classmethod
     def configured(cls, config: ControlConfig, settings: None) -> Self:
         """Make a torso with the zones, deviations and repertoire of the section `control`. Raises InputRefused."""
         return cls(config.no_point_zones, config.variability, repertoire_of(config), alive=config.alive)
 
-    # -- the contract -------------------------------------------------------------------------------------------
-
-    def estimate(self, behavior: BlockBehavior, pose: BodyPose | None, world: World) -> Estimate:
-        return self._estimate(self.moves, behavior, pose, world)
-
-    def _estimate(
-        self, torso: Torso, behavior: BlockBehavior, pose: BodyPose | None, world: World, only: str = ""
-    ) -> Estimate:
-        match behavior:
-            case Speech() if self._deviations.of("voiceless"):
-                return Impossible("CANNOT_CREATE_BEHAVIOR", "the voice cannot speak").estimate(behavior)
-            case Speech():
-                return speech_estimate(behavior, uttered(behavior), torso.pose(world, pose))
-            case Wait(duration=duration):
-                return wait_estimate(behavior, duration or 0.0, torso.pose(world, pose))
-        estimate = torso.estimate(behavior, pose, world, only)
-        is_beneath = pose is None and choreography.is_shift(behavior) and torso.is_overlaid()
-        return beneath_a_look(estimate) if is_beneath else estimate
-
-    def rehearse(
-        self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
-    ) -> Sequence[Estimate]:
-        return finished(self._rehearsed(items, world, others))
-
-    def rehearse_in_steps(
-        self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem] = ()
-    ) -> Steps[Sequence[Estimate]]:
-        if type(self).rehearse is not SimulatedBody.rehearse:  # what a subclass says counts
-            return self.rehearse(items, world, others)
-        return (yield from self._rehearsed(items, world, others))
-
-    def _rehearsed(
-        self, items: Sequence[EstimateItem], world: World, others: Sequence[EstimateItem]
-    ) -> Steps[Sequence[Estimate]]:
-        """Estimate all as of now, whatever happens between the steps."""
-        clock, told = ClockOfCopy(self._loop.time()), dict[int, Estimate]()
-        still, is_mine = beside(self.moves, clock, world), type(self).estimate is SimulatedBody.estimate
-        moving = [item for item in items if item.times] if not self.moves.misbelieved else []
-        if moving:
-            going = ClockOfCopy(clock.at)
-            copy = beside(self.moves, going, world)
-            told |= zip(map(id, moving), (yield from rehearsed(copy, going, moving, others)), strict=True)
-        for item in items:
-            if id(item) not in told:
-                asked = (item.behavior, item.pose, world)
-                told[id(item)] = self._estimate(still, *asked, item.only) if is_mine else self.estimate(*asked)
-                yield ELEMENTS
-        return [told[id(item)] for item in items]
-
-    def perform(self, behavior: BlockBehavior, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-        if isinstance(behavior, Speech):
-            return self._speak(behavior, authority)
-        return super().perform(behavior, authority)
-
-    async def home(self, parts: tuple[str, ...] = ()) -> None:
-        if not parts or "voice" in parts:
-            self._voice.hush()
-        await super().home(parts)
-
-    def state(self) -> BodyState:
-        now = self._loop.time()
-        pose = tracks.pose_at(self.moves.tracks, now)
-        return BodyState(
-            pose=kinematics.pose_message(pose), gaze=kinematics.gaze(pose),
-            left_arm=kinematics.arm(pose, "left"), right_arm=kinematics.arm(pose, "right"),
-            moving=self._voice.is_busy or any(track.is_moving(now) for track in self.moves.tracks.values()),
-            looking_at=self.moves.attention.fixated(now), speaking=self._voice.saying,
-        )  # fmt: skip
-
-    def see(self, world: World) -> None:
-        self.moves.world = world
-        self.moves.follow()
-
-    # -- what it does not measure -------------------------------------------------------------------------------
-
-    def seen(self) -> Seen | None:
-        by = _beside(self._deviations, self._offsets)
-        return seen_with(tracks.pose_at(self.moves.tracks, self._loop.time()), by) if by else None
-
-    def ray_at(self, part: str, pose: BodyPose) -> Ray | None:
-        angles = tracks.updated(kinematics.HOME, pose)
-        match part:
-            case "head":
-                return kinematics.gaze(angles)
-            case "left_arm":
-                return kinematics.arm(angles, "left")
-            case "right_arm":
-                return kinematics.arm(angles, "right")
-        return None
-
-    def calibrate(self, offsets: Mapping[str, Radians]) -> None:
-        if unknown := [joint for joint in offsets if kinematics.LIMIT.get(joint) is None]:
-            reason, advice = f"no joint {', '.join(unknown)}", f"its joints are {', '.join(kinematics.LIMIT)}"
-            raise InputRefused(Fault(reason=reason, where="control.calibration", advice=advice, service="control"))
-        self._offsets = dict(offsets)
-
-    # -- what belongs to no behavior ----------------------------------------------------------------------------
-
-    def idle(self) -> Idle:
-        """Tell of lips with the voice, and of a torso that is alive what it does where nothing else is done."""
-        now, alive = self._loop.time(), self._alive
-        face = self.moves.tracks["face"]
-        expression = dict(zip(face.joints, face.angles(now), strict=True))
-        added = self._mouth.added(now, expression)
-        quick_at = now if self._mouth.is_moving(now) else inf
-        if alive is None:
-            return Idle(added=added, quick_at=quick_at)
-        busy = {part for part, track in self.moves.tracks.items() if track.is_moving(now)} | {*self.moves.runs}
-        by_itself = alive.added(now, expression, face_rests="face" not in busy, body_rests=not busy - {"face"})
-        added = {joint: added.get(joint, 0.0) + by_itself.get(joint, 0.0) for joint in (*added, *by_itself)}
-        return Idle(added=added, quick_at=min(quick_at, alive.quick_at(now)))
-
-    def move_lips(self, shapes: Sequence[MouthShape]) -> None:
-        self._mouth.move(shapes, self._loop.time())
-
-    # -- faults -------------------------------------------------------------------------------------------------
-
-    @property
-    def faults(self) -> tuple[BodyFault, ...]:
-        return self._deviations.faults
-
-    def switch_faults(self, faults: Sequence[BodyFault]) -> None:
-        on, displaced = _displaced(self.faults), _displaced(faults)
-        if reason := self.moves.objection_to(on, displaced):
-            raise InputRefused(Fault(reason=reason, where="displaced", service="control"))
-        self._deviations = Deviations(self._deviations.seed, tuple(faults))
-        self.moves.displace(on, displaced)
-        self.moves.deviate(self._deviations)
-        self._voice.is_mute = bool(self._deviations.of("mute"))
-        if self._deviations.of("voiceless"):
-            self._voice.hush()
-
-    # -- motion -------------------------------------------------------------------------------------------------
-
-    def set_out(self, behavior: BlockBehavior, authority: MovementAuthority) -> Run:
-        course = choreography.plan(behavior, self.moves.situation(self.moves.world, real=True))
-        run = self.moves.set_out(Run(behavior, course, authority, self._deviations, self._occasions + 1))
-        self._occasions += not run.is_beneath
-        return run
-
-    def confirm(self, run: Run, sync: str) -> None:
-        if self.moves.is_off_target(run, sync):
-            raise BodyFailed(_fault(run.behavior, "its target is out of reach where the torso is now"))
-
-    def is_behind(self, run: Run) -> bool:
-        return self.moves.is_behind(run)
-
     async def come(self, run: Run, point: WalkPoint, due: Seconds) -> Seconds | None:
         if point.is_told:
             return due
         if point.sync == OVERHEAT:
-            raise BodyFailed(_fault(run.behavior, f"the motor of the {run.course.parts[0]} is overheated"))
+            raise BodyFailed(fault(run.behavior, f"the motor of the {run.course.parts[0]} is overheated"))
         stall = run.faults[STALL]
         until = inf if stall is None or stall.amount is None else self._loop.time() + stall.amount
         while not run.is_over and point in run.pending and not run.bell.is_past(until):
@@ -246,51 +47,10 @@ class SimulatedBody(WalkingBody[Run]):
         run.pending = [each for each in run.pending if each is not point]
         return None
 
-    # -- voice --------------------------------------------------------------------------------------------------
-
-    async def _speak(self, behavior: Speech, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-        await self._voice.wait_for_silence(authority)
-        if authority.revoked is not None:
-            return
-        if self._deviations.of("voiceless"):
-            raise BehaviorRefused(_fault(behavior, "the voice cannot speak"))
-        self._occasions += 1
-        pace = 1.0 / variability.rate(self._deviations, ("voice",), behavior.id, self._occasions)
-        words = speak(behavior, authority, pace, self.on_lips)
-        async with aclosing(self._voice.say(behavior, authority, words)) as utterance:
-            async for progress in utterance:
-                yield progress
-                if isinstance(progress, Reached) and progress.sync == "end":
-                    return
-        if self._deviations.of("voiceless"):
-            raise BodyFailed(_fault(behavior, "the voice cannot speak"))
-
-
-def _displaced(faults: Sequence[BodyFault]) -> dict[str, float]:
-    return {fault.part: radians(fault.amount or 0.0) for fault in faults if fault.kind == "displaced"}
-
-
-def _fault(behavior: BlockBehavior, reason: str, advice: str = "") -> Fault:
-    return Fault(reason=reason, where=behavior.id, advice=advice, service="control")
-
-
-def _beside(deviations: Deviations, offsets: Mapping[str, Radians]) -> dict[str, Radians]:
-    """Angles by which the true ones are more than those that the body tells: miscalibrated, less what is corrected.
-
-    offsets: by which the body corrects what its joints measure.
-    """
-    by = {joint: -offset for joint, offset in offsets.items()}
-    for fault, amount in deviations.of("miscalibrated"):
-        for joint in [limit.joint for limit in kinematics.JOINTS if fault.part in ("", limit.part, limit.joint)]:
-            if kinematics.LIMIT[joint].part != "face":
-                by[joint] = by.get(joint, 0.0) + radians(amount)
-    return {joint: angle for joint, angle in by.items() if angle}
-
-
-def seen_with(told: kinematics.Pose, by: Mapping[str, Radians]) -> Seen | None:
-    """Tell what people see of a body that tells these angles and is so much beside; None: just that."""
-    if not by:
-        return None
-    angles = {joint: angle + by.get(joint, 0.0) for joint, angle in told.items()}
-    arms = kinematics.arm(angles, "left"), kinematics.arm(angles, "right")
-    return Seen(gaze=kinematics.gaze(angles), left_arm=arms[0], right_arm=arms[1])
+    def beside(self) -> Mapping[str, Radians]:
+        by = {joint: -offset for joint, offset in self._offsets.items()}
+        for each, amount in self._deviations.of("miscalibrated"):
+            for joint in [limit.joint for limit in kinematics.JOINTS if each.part in ("", limit.part, limit.joint)]:
+                if kinematics.LIMIT[joint].part != "face":
+                    by[joint] = by.get(joint, 0.0) + radians(amount)
+        return {joint: angle for joint, angle in by.items() if angle}

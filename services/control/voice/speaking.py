@@ -1,4 +1,4 @@
-"""Speech and waiting on loop time: the behaviors of a body that move no joint.
+"""Speech on loop time: a behavior of a body that moves no joint.
 
 A text is said part by part, and a part may come only while the one before it is said. A silent voice has one part,
 with the words in time alone; one that sounds has a part for each phrase. What is to come in a part are items in time
@@ -16,7 +16,7 @@ from math import inf
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import Speech, Wait
+from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.text import tokens
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.bell import EARLY, Bell
@@ -481,25 +481,3 @@ class _Utterance:
         self._lips = self._lips[passed[-1] if passed else 0 :]
         if self._lips:
             self._on_lips([replace(each, at=self._begin + each.at) for each in self._lips])
-
-
-async def wait(behavior: Wait, authority: MovementAuthority) -> AsyncGenerator[Progress, None]:
-    """Let the duration of the behavior pass, and then hold until its end may be passed."""
-    bell = Bell()
-    begin = bell.now()
-    due = begin + (behavior.duration or 0.0)
-    unwatch = authority.watch(bell.ring)
-    try:
-        yield Reached("start", begin, begin)
-        while not bell.is_past(due) and authority.revoked is None:
-            await bell.wait(due)
-        left = due
-        if authority.revoked is None and not authority.covers("end"):
-            yield Arrived("end", due)
-            while authority.revoked is None and not authority.covers("end"):
-                await bell.wait(inf)
-            left = bell.now()
-        if authority.revoked is None:
-            yield Reached("end", left, due)
-    finally:
-        unwatch()

@@ -7,12 +7,11 @@ plain BML.
 
 from collections.abc import Collection, Mapping, Sequence
 
-import msgspec
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.behavior_types import SERIES, TYPES
 from engage_hri.schemas.behaviors import (
-    Action,
     After,
     BlockBehavior,
     Constraint,
@@ -32,14 +31,21 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.generation.block.lowering import lowered
 from engage_hri.services.generation.block.ordering import ordered
-from engage_hri.services.generation.block.parts import FreshIds, Made, Mention, Parts
-from engage_hri.services.generation.block.profiles import after, as_in_the_figure, checking_back, from_there, same
-from engage_hri.services.generation.block.punctuation import moved_punctuation
-from engage_hri.services.generation.block.rewriting import Operator, Rewriting, instants, points_named, tie_needs
+from engage_hri.services.generation.block.parts import (
+    FreshIds,
+    Made,
+    Parts,
+    after,
+    as_in_the_figure,
+    checking_back,
+    from_there,
+    same,
+)
+from engage_hri.services.generation.block.rewriting import Operator, Rewriting, points_named, tie_needs, tied
+from engage_hri.services.generation.block.words import lowered, moved_punctuation
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.permits import Permits
+from engage_hri.services.generation.inhibitions import Permits
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation, Stroke, first_met, stroke
 from engage_hri.services.generation.turns.policy import TurnPlan
 
@@ -50,13 +56,12 @@ FIGURE_LEAD: Seconds = 2.0
 class FragmentPlan(Struct, frozen=True, kw_only=True):
     """The block of a fragment and what is known of it before it is sent.
 
-    continuation: for the turn's next fragment. mentions: when each object is referred to. made: the behaviors of
-    each reference, in order. opening: ids of what opens the turn.
+    continuation: for the turn's next fragment. made: the behaviors of each reference, in order. opening: ids of what
+    opens the turn.
     """
 
     block: Block
     continuation: Continuation = NO_CONTINUATION
-    mentions: tuple[Mention, ...] = ()
     made: tuple[Made, ...] = ()
     opening: tuple[str, ...] = ()
     choices: tuple[ReferenceChoice, ...] = ()
@@ -112,7 +117,7 @@ class Emission:
             replacements={id: parts.replacement(gaze_leads=self.figure) for id, parts in self.parts.items()}
             | {id: self.parts[said_by].closing for id, said_by in punctuation.follows.items()},
             words=frozenset(self.speeches),
-            instants=instants(fragment.behaviors, fragment.constraints),
+            instants=tied(fragment.behaviors, fragment.constraints, at_one_instant=True),
             dropped=frozenset(behavior.id for behavior in self.dropped),
             begins=before.start,
         )
@@ -142,7 +147,6 @@ class Emission:
             continuation=Continuation(
                 self.speeches[-1] if self.speeches else "", self.last_glance, tuple(self.strokes)
             ),
-            mentions=tuple(parts.mention for parts in self.parts.values()),
             made=tuple(parts.made for parts in self.parts.values()),
             choices=tuple(self.choices),
             opening=tuple(each.id for each in opening),
@@ -170,8 +174,8 @@ class Emission:
 
     def _passed_through(self, behavior: BlockBehavior) -> BlockBehavior:
         if isinstance(behavior, Pointing) and behavior.mode is None and self.permits.only_hand:
-            behavior = msgspec.structs.replace(behavior, mode=self.permits.only_hand)
-        new = msgspec.structs.replace(behavior, timing=self.rewriting.timing(behavior), needs=self._needs(behavior))
+            behavior = replace(behavior, mode=self.permits.only_hand)
+        new = replace(behavior, timing=self.rewriting.timing(behavior), needs=self._needs(behavior))
         return behavior if new == behavior else new
 
     def _needs(self, behavior: BlockBehavior) -> tuple[str, ...]:
@@ -308,22 +312,11 @@ class Emission:
     def _ends_with_gaze(self) -> bool:
         return self.turn.closes and self.permits.looks
 
-    def _event(
-        self,
-        id: str,
-        kind: EventKind,
-        start: str,
-        needs: tuple[str, ...] = (),
-        *,
-        accept: tuple[Action, ...] = (),
-        within: Seconds | None = None,
-        optional: bool = False,
-    ) -> Event:
+    def _event(self, id: str, kind: EventKind, start: str, needs: tuple[str, ...]) -> Event:
         """An event of the turn. start: the sync point with which it begins; "": it begins with the block."""
         return Event(
             id=self.names.fresh(id), kind=kind, responder=self.turn.addressee, cause="turn", turn=self.turn.turn,
-            timing=(Timing("start", start),) if start else (), accept=accept, limit=within, optional=optional,
-            needs=needs,
+            timing=(Timing("start", start),) if start else (), needs=needs,
         )  # fmt: skip
 
     def _opening(self) -> list[BlockBehavior]:
@@ -332,7 +325,8 @@ class Emission:
         start = f"{self.speeches[0]}:start" if self.speeches else ""
         needs = next((each.hinge for each in self.parts.values() if [*each.hinge] == self.speeches[:1]), ())
         if turn.announces_pair:
-            return [self._event("turn-pair", "adjacency_pair", start, needs, accept=turn.accept, within=turn.within)]
+            pair = self._event("turn-pair", "adjacency_pair", start, needs)
+            return [replace(pair, accept=turn.accept, limit=turn.within)]
         if turn.reply:
             id = self.names.fresh(f"turn-{turn.reply}")
             timing = (Timing("start", start),) if start else ()
@@ -367,7 +361,9 @@ class Emission:
             gaze = self.names.fresh("turn-gaze")
             closing.append(Gaze(id=gaze, target=turn.addressee, needs=self.hinge))
             start = f"{gaze}:start"
-            closing.append(self._event("turn-gaze-event", "mutual_facial_gaze", start, optional=True, needs=(gaze,)))
+            closing.append(
+                replace(self._event("turn-gaze-event", "mutual_facial_gaze", start, (gaze,)), optional=True)
+            )
             if len(ends) > 1 or (ends and looks):
                 operators += [after(end, f"{gaze}:start") for end in ends]
             elif ends:
@@ -376,9 +372,9 @@ class Emission:
                 operators += self._once_all_is_done(f"{gaze}:start")
             if self.last_gaze:
                 operators.append(same(f"{self.last_gaze}:relax", f"{gaze}:start"))
-            signal = msgspec.structs.replace(signal, timing=(Timing("start", f"{gaze}:start"),))
+            signal = replace(signal, timing=(Timing("start", f"{gaze}:start"),))
         if len(ends) == 1 and not (looks and self._ends_with_gaze):
-            signal = msgspec.structs.replace(signal, timing=(Timing("start", f"{self.speeches[-1]}:end"),))
+            signal = replace(signal, timing=(Timing("start", f"{self.speeches[-1]}:end"),))
         elif not self._ends_with_gaze:
             operators += self._once_all_is_done(f"{ended}:start")
         closing.append(signal)
@@ -396,15 +392,11 @@ class Emission:
                 parts = self.parts[behavior.id]
                 if parts.phrase:
                     break
-                ends.append(":".join(parts.mention.by))
+                ends.append(":".join(parts.made.by))
         return ends
 
     def _once_all_is_done(self, sync: str) -> list[Operator]:
         """Operators that put `sync` after the turn's last words and after all behaviors that end by themselves."""
         ends = [self.before.start] if self.before.start else []
-        ends += [f"{behavior.id}:end" for behavior in self._in_document_order() if _ends_by_itself(behavior)]
+        ends += [f"{each.id}:end" for each in self._in_document_order() if not TYPES[type_name(each)].lasts]
         return [after(end, sync) for end in ends]
-
-
-def _ends_by_itself(behavior: BlockBehavior) -> bool:
-    return not TYPES[type_name(behavior)].lasts

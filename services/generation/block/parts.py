@@ -1,10 +1,22 @@
-"""Behaviors that replace one reference, and ids that the fragment does not use."""
+"""Behaviors that replace a reference, and their timing: `check-back`, of Appendix B, or `figure-3.3`."""
 
 from msgspec import Struct
 
-from engage_hri.schemas.behaviors import BlockBehavior, Event, Gaze, Hand, Pointing, Reference, Speech, Timing
+from engage_hri.schemas.behaviors import (
+    After,
+    BlockBehavior,
+    Event,
+    Gaze,
+    Hand,
+    Pointing,
+    Reference,
+    Speech,
+    Synchronize,
+    Timing,
+)
 from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
-from engage_hri.services.generation.block.rewriting import Point, Replacement
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.generation.block.rewriting import Operator, Point, Replacement
 from engage_hri.services.generation.turns.policy import TurnPlan
 
 
@@ -27,12 +39,12 @@ class Made(Struct, frozen=True):
     def gestures(self) -> tuple[str, ...]:
         return tuple(filter(None, (self.gaze, self.point)))
 
-
-class Mention(Struct, frozen=True):
-    """An object that a block refers to. by: the sync point from which on it has been referred to."""
-
-    object: str
-    by: Point
+    @property
+    def by(self) -> Point:
+        """The sync point from which on the object has been referred to: the end of its phrase, or of its gesture."""
+        if self.phrase:
+            return self.phrase, "end"
+        return (self.point, "stroke_end") if self.point else (self.gaze, "stroke")
 
 
 class FreshIds:
@@ -125,18 +137,80 @@ class Parts:
         """Replacement of a speech that is nothing but the phrase's punctuation."""
         return Replacement((self.phrase, "end"), (self.phrase, "end"))
 
-    @property
-    def mention(self) -> Mention:
-        """The reference's object, and the end of its phrase or gesture."""
-        return Mention(self.reference.target, self.replacement(gaze_leads=False).end)
-
     def replacement(self, *, gaze_leads: bool) -> Replacement:
         """The points that stand for start and end of the reference. gaze_leads: before the phrase, as in Fig. 3.3."""
-        if self.phrase:
-            end = (self.phrase, "end")
-        else:
-            end = (self.point, "stroke_end") if self.point else (self.gaze, "stroke")
         leads = gaze_leads and self.gaze and self.phrase
         return Replacement(
-            (self.gaze or self.phrase, "start"), end, start_of_words=(self.phrase, "start") if leads else None
+            (self.gaze or self.phrase, "start"),
+            self.made.by,
+            start_of_words=(self.phrase, "start") if leads else None,
         )
+
+
+def checking_back(parts: Parts, preceding: str, earlier: str, is_timed: bool, glance: str) -> list[Operator]:
+    """Profile `check-back`: phrase, look and point begin together and last until the other has looked.
+
+    preceding: the speech or phrase before this one. earlier: the last one of the turn's earlier fragments. is_timed:
+    the author has said when the reference starts. glance: the last one before it. "": there is none.
+    """
+    gaze, point, phrase, event = parts.gaze, parts.point, parts.phrase, parts.event
+    operators: list[Operator] = []
+    if phrase and preceding:
+        operators.append(after(f"{preceding}:end", f"{phrase}:start"))
+    if gaze:
+        # What the author has said of its start replaces this, but nothing begins before the fragment does.
+        if words := earlier if is_timed else preceding:
+            operators.append(after(f"{words}:end", f"{gaze}:start"))
+        if glance:
+            operators.append(after(f"{glance}:stroke", f"{gaze}:start"))
+        if phrase:
+            operators.append(after(f"{phrase}:end", f"{gaze}:relax"))
+    if gaze and phrase and not point:
+        operators.append(after(f"{gaze}:stroke", f"{phrase}:start"))
+    if point:
+        operators.append(after(f"{gaze}:start", f"{point}:start"))
+        operators.append(after(f"{gaze}:stroke", f"{point}:stroke_start"))
+        if phrase:
+            operators.append(same(f"{point}:stroke_start", f"{phrase}:start"))
+            operators.append(after(f"{phrase}:end", f"{point}:stroke_end"))
+        operators.append(after(f"{event}:end", f"{point}:stroke_end"))
+    return operators
+
+
+def from_there(earlier: str, leaves: str, later: str, stays: bool) -> Operator:
+    """Order that says where a look or point begins: on the target of the `earlier` one, or at home (decision 0024).
+
+    leaves: the sync point at which the earlier leaves its target. stays: it does so no sooner than the later begins.
+    """
+    return same(f"{earlier}:{leaves}", f"{later}:start") if stays else after(f"{earlier}:end", f"{later}:start")
+
+
+def as_in_the_figure(parts: Parts, preceding: str, earlier: str, is_timed: bool, lead: Seconds) -> list[Operator]:
+    """Profile `figure-3.3`: the gaze leads by a phrase, and the point is over when the phrase begins.
+
+    lead: seconds from the gaze on target to the stroke of the point. The other parameters: see `checking_back`.
+    """
+    gaze, point, phrase = parts.gaze, parts.point, parts.phrase
+    operators: list[Operator] = []
+    if gaze and preceding and (phrase or not is_timed):
+        # An earlier fragment's words may have begun by now: the gaze is on target with them, or as soon as it can.
+        follows = preceding == earlier
+        relate = after if follows else same
+        operators.append(relate(f"{preceding}:start", f"{gaze}:stroke"))
+        if point and follows:
+            operators.append(after(f"{gaze}:start", f"{point}:start"))
+    if point:
+        operators.append(same(f"{gaze}:stroke+{lead:g}", f"{point}:stroke_start"))
+        if phrase:
+            operators.append(same(f"{point}:stroke_end", f"{phrase}:start"))
+    if phrase and preceding:
+        operators.append(after(f"{preceding}:end", f"{phrase}:start"))
+    return operators
+
+
+def after(reference: str, sync: str) -> After:
+    return After(ref=reference, syncs=(sync,))
+
+
+def same(reference: str, sync: str) -> Synchronize:
+    return Synchronize(ref=reference, syncs=(sync,))

@@ -203,26 +203,24 @@ def _is_same(one: str, other: str) -> bool:
     return replace(SyncRef.parse(one), offset=0.0) == replace(SyncRef.parse(other), offset=0.0)
 
 
-def instants(behaviors: Sequence[Behavior], constraints: Sequence[Constraint]) -> Sequence[Sequence[str]]:
-    """Groups of sync points that the input puts at one instant, or a fixed time apart."""
-    inline = [(f"{behavior.id}:{timing.sync}", timing.ref) for behavior in behaviors for timing in behavior.timing]
+def tied(
+    behaviors: Sequence[Behavior], constraints: Sequence[Constraint], *, at_one_instant: bool = False
+) -> list[tuple[str, ...]]:
+    """Groups of sync points that a timing or an operator relates; "": the clock.
+
+    at_one_instant: only those that the input puts at one instant, or a fixed time apart.
+    """
+    inline = [(f"{each.id}:{timing.sync}", timing.ref) for each in behaviors for timing in each.timing]
     operators = [operator for constraint in constraints for operator in constraint.operators]
-    return [*inline, *((each.ref, *each.syncs) for each in operators if isinstance(each, Synchronize))]
+    kept = [each for each in operators if isinstance(each, Synchronize) or not at_one_instant]
+    return [*inline, *((each.ref, *each.syncs) for each in kept)]
 
 
 def points_named(
     fragment: str, behaviors: tuple[Behavior, ...], constraints: tuple[Constraint, ...]
 ) -> Counter[Point]:
     """Number of times that the input names each (behavior, sync), on either side of a constraint or inline."""
-    texts = [f"{behavior.id}:{timing.sync}" for behavior in behaviors for timing in behavior.timing]
-    texts += [timing.ref for behavior in behaviors for timing in behavior.timing]
-    texts += [
-        text
-        for constraint in constraints
-        for operator in constraint.operators
-        for text in (operator.ref, *operator.syncs)
-    ]
-    refs = map(SyncRef.parse, filter(None, texts))
+    refs = [SyncRef.parse(text) for group in tied(behaviors, constraints) for text in group if text]
     return Counter((ref.behavior, ref.sync) for ref in refs if ref.block in ("", fragment))
 
 
@@ -236,10 +234,7 @@ def tie_needs(needs: dict[str, tuple[str, ...]], behaviors: Sequence[Behavior], 
         needs[id] = ()
     groups = [
         {ref.behavior for text in group if text and (ref := SyncRef.parse(text)).block in ("", fragment.id)}
-        for group in [
-            *((f"{each.id}:{timing.sync}", timing.ref) for each in behaviors for timing in each.timing),
-            *((each.ref, *each.syncs) for constraint in fragment.constraints for each in constraint.operators),
-        ]
+        for group in tied(behaviors, fragment.constraints)
     ]
     order = list(dict.fromkeys(needed for needed in needs.values() if needed))
     changed = True

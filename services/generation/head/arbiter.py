@@ -14,15 +14,14 @@ from engage_hri.schemas.behaviors import Event, GazeShift, Timing
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.fragments import Claim
-from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Degrees, Radians, Seconds
 from engage_hri.schemas.world import World
+from engage_hri.services.bus.deadlines import Acquaintances
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.head.inhibitions import Inhibition
-from engage_hri.services.generation.head.maintenance_policy import FaceWatch, GlanceWatch, HandWatch
+from engage_hri.services.generation.head.maintenance_policy import FaceWatch, GlanceWatch, HandWatch, OfPeople
 from engage_hri.services.generation.head.response_policy import ResponsePolicy
-from engage_hri.services.runtime.absent import Acquaintances
+from engage_hri.services.generation.inhibitions import Inhibition
 
 DWELL: Seconds = 0.3
 """Time that the head stays after its owner let go, before a lower claim gets it: a claim that comes back at once
@@ -33,9 +32,7 @@ all the time. Ours."""
 NOBODY = Claim(kind="none", priority=0, reason="nobody has been seen")
 UP_RIGHT: Degrees = 60.0
 """Angle past the table: as far as the neck turns, at nothing that anybody could mean. Thesis 5.3."""
-Observation = (
-    World | RobotState | Statistics | ConnectionEvent | ActionBegan | ActionEnded | ActorFound | ActorLost
-)  # fmt: skip
+Observation = World | RobotState | Statistics | ConnectionEvent | OfPeople
 
 
 class Aim(Struct, frozen=True):
@@ -142,13 +139,9 @@ class Arbiter:
                     half_angle=self._half_angle,
                     fragment_target=self._owner.target if self._owner.kind == "fragment" else "",
                 )
-            case ActionBegan() | ActionEnded():
+            case _:
                 self._hands.feed(observation, now)
-            case ActorFound():
                 self._faces.feed(observation, now)
-            case ActorLost():
-                self._faces.feed(observation, now)
-                self._hands.feed(observation, now)
 
     def gaze_perceived_within(self, half_angle: Radians) -> None:
         """Take the half angle of the body's gaze cone; one in the configuration goes before."""

@@ -1,6 +1,7 @@
-"""The maintenance policy: three watches, each with a claim on the head.
+"""The maintenance policy: three watches, each with a claim on the head. Thesis 3.3.4.
 
-They watch moving hands, the face of the person, and the time since the last connection event. Thesis 3.3.4.
+Engagement is kept up also while nothing is said or shown: people look at what the other's hands do, else at the face,
+and when nothing has connected them for longer than usual they check with a glance whether the other still attends.
 """
 
 import math
@@ -14,9 +15,9 @@ from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, 
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.bus.deadlines import Absent
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.reports.action_reports import FACE_GRACE
-from engage_hri.services.runtime.absent import Absent
 
 HAND_SPEED = 0.05
 """Speed in m/s above which a hand counts as moving: below it is the noise of vision. Ours."""
@@ -34,6 +35,8 @@ MTBCE_HIGH: Seconds = 15.0
 """Greatest value that the recent mean counts as: silence is no reason to glance no more. Ours."""
 MTBCE_EVENTS = 5
 """Number of connection events, without the robot's glances, from which on the mean is believed. Ours."""
+OfPeople = ActionBegan | ActionEnded | ActorFound | ActorLost
+"""News of people; each watch takes what concerns it."""
 
 
 class _Hand(Struct):
@@ -56,7 +59,7 @@ class HandWatch:
         """Manipulations under way: actor and targets -> the hand, or the object if no hand of the actor is known."""
         self._watched = ""
 
-    def feed(self, message: World | ActionBegan | ActionEnded | ActorLost, now: Seconds) -> None:
+    def feed(self, message: World | OfPeople, now: Seconds) -> None:
         match message:
             case World():
                 self._places = {entity.id: entity for entity in message.entities}
@@ -157,7 +160,7 @@ class FaceWatch:
         self.partner = ""
         """Id of the person spoken to last."""
 
-    def feed(self, message: World | ActorFound | ActorLost, now: Seconds) -> None:
+    def feed(self, message: World | OfPeople, now: Seconds) -> None:
         match message:
             case World():
                 seen = {person.id: person for person in message.people if person.id != self._robot}

@@ -1,8 +1,14 @@
-"""The response policy: answers directed gaze and facial gaze that people initiate by looking there. Thesis 3.3.3."""
+"""The response policy: answers directed gaze and facial gaze that people initiate by looking there. Thesis 3.3.3.
 
+A person who directs to something, or seeks the robot's eyes, waits for them: without an answer the connection fails.
+So the robot always looks where people direct, and meets their gaze, unless its own is inhibited. What to answer to
+words takes knowledge of the task: that is the collaboration manager's.
+"""
+
+import math
 from collections.abc import Sequence
+from statistics import fmean
 
-import numpy as np
 from msgspec import Struct
 
 from engage_hri.schemas.body import Ray
@@ -104,21 +110,13 @@ def viewing_order(
     entities = [entity for id in objects if world is not None and (entity := world.entity(id)) is not None]
     if len(entities) < 2 or gaze is None:
         return tuple(entity.id for entity in entities) or tuple(objects[:1])
-    centroid = np.mean([entity.position for entity in entities], axis=0)
-    place = (float(centroid[0]), float(centroid[1]), float(centroid[2]))
-    there = Ray(origin=gaze.origin, axis=_towards(gaze, place))
-    if all(angle_off_axis(there, entity.position) <= half_angle + TOLERANCE for entity in entities):
-        return (min(entities, key=lambda entity: (angle_off_axis(there, entity.position), entity.id)).id,)
+    centroid = map(fmean, zip(*(entity.position for entity in entities), strict=True))
+    x, y, z = (there - eye for there, eye in zip(centroid, gaze.origin, strict=True))
+    at_all = gaze if math.hypot(x, y, z) <= TOLERANCE else Ray(origin=gaze.origin, axis=(x, y, z))
+    if all(angle_off_axis(at_all, entity.position) <= half_angle + TOLERANCE for entity in entities):
+        return (min(entities, key=lambda entity: (angle_off_axis(at_all, entity.position), entity.id)).id,)
 
     def off(entity: Entity) -> tuple[float, str]:
         return angle_off_axis(gaze, entity.position), entity.id
 
     return tuple(entity.id for entity in sorted(entities, key=off))
-
-
-def _towards(gaze: Ray, place: tuple[float, float, float]) -> tuple[float, float, float]:
-    reach = np.asarray(place) - np.asarray(gaze.origin)
-    distance = float(np.linalg.norm(reach))
-    if distance <= TOLERANCE:
-        return gaze.axis
-    return float(reach[0]) / distance, float(reach[1]) / distance, float(reach[2]) / distance

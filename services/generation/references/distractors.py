@@ -98,7 +98,7 @@ def angle_off_axis(gaze: Ray, place: Vector) -> Radians:
     distance = float(np.linalg.norm(reach))
     if distance <= TOLERANCE:
         return 0.0
-    return math.acos(max(-1.0, min(1.0, float(reach @ _unit(gaze.axis)) / distance)))
+    return math.acos(max(-1.0, min(1.0, float(reach @ _units([gaze])[0]) / distance)))
 
 
 def _vectors(vectors: Sequence[Vector]) -> NDArray[np.float64]:
@@ -108,8 +108,3 @@ def _vectors(vectors: Sequence[Vector]) -> NDArray[np.float64]:
 def _units(rays: Sequence[Ray]) -> NDArray[np.float64]:
     axes = _vectors([ray.axis for ray in rays])
     return np.asarray(axes / np.sqrt(np.einsum("rx,rx->r", axes, axes))[:, None])
-
-
-def _unit(axis: Vector) -> NDArray[np.float64]:
-    vector = np.asarray(axis, dtype=np.float64)
-    return vector / np.linalg.norm(vector)

@@ -6,7 +6,7 @@ that is asked is what a motion comes to, never its phases.
 """
 
 from collections.abc import Iterable, Sequence
-from typing import Literal
+from typing import Literal, NamedTuple, get_args
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -19,49 +19,28 @@ CURRENT_POSE = ""
 AT_REST = ":rest"
 """Start of a motion: where head or arm go when they have nothing to do. No entity has such an id."""
 
+Part = Literal["head", "arm"]
+PARTS: tuple[Part, ...] = get_args(Part)
 
-class Way(Struct, frozen=True):
+
+class Way(NamedTuple):
     """A motion of the head or an arm that is on `since`, to `target`."""
 
-    part: Literal["head", "arm"]
+    part: Part
     since: str
     target: str
 
 
-class NotAsked(LookupError):
-    """A motion is needed for which the body has not been asked."""
-
-
 class Motions(Struct, frozen=True):
-    """Estimates by (since, target): a head or an arm that is on `since`, CURRENT_POSE or AT_REST, goes to `target`.
+    """Estimates of the body by way. A way begins at the target of another one, CURRENT_POSE or AT_REST.
 
     glance: the person looked at after each point, before the next reference is made; "": nobody, the head stays.
     looks_last: a look lasts until the next one, whatever comes between, as in profile `figure-3.3`.
     """
 
-    gazes: dict[tuple[str, str], Estimate]
-    points: dict[tuple[str, str], Estimate]
+    known: dict[Way, Estimate]
     glance: str = ""
     looks_last: bool = False
-
-    def gaze(self, since: str, target: str) -> Estimate:
-        """The gaze at `target` from there. Raises NotAsked."""
-        return _known(self.gazes, since, target)
-
-    def point(self, since: str, target: str) -> Estimate:
-        """The point at `target` from there. Raises NotAsked."""
-        return _known(self.points, since, target)
-
-    def has(self, way: Way) -> bool:
-        """True if the body has been asked for this motion."""
-        return (way.since, way.target) in (self.gazes if way.part == "head" else self.points)
-
-
-def _known(motions: dict[tuple[str, str], Estimate], since: str, target: str) -> Estimate:
-    try:
-        return motions[since, target]
-    except KeyError:
-        raise NotAsked(f"from {since!r} to {target!r}") from None
 
 
 def arm_of(point: Estimate) -> str:
@@ -122,13 +101,11 @@ def from_here(
 
 def from_here_told(targets: Sequence[str], answers: Sequence[Estimate], glance: str = "") -> Motions:
     """Motions from where the body is. targets, answers, glance: of `from_here`."""
-    each = answers[:-1] if glance else answers
-    gazes = {(CURRENT_POSE, target): gaze for target, gaze in zip(targets, each[::2], strict=True)}
-    points = {(CURRENT_POSE, target): point for target, point in zip(targets, each[1::2], strict=True)}
-    if glance and answers[-1].feasible:
-        gazes[CURRENT_POSE, glance] = answers[-1]
-        return Motions(gazes, points, glance)
-    return Motions(gazes, points)
+    ways = [Way(part, CURRENT_POSE, target) for target in targets for part in PARTS]
+    if glance:
+        ways.append(Way("head", CURRENT_POSE, glance))
+    known = dict(zip(ways, answers, strict=True))
+    return Motions(known, glance if glance and answers[-1].feasible else "")
 
 
 def onward(ways: Sequence[Way], motions: Motions, hand: Hand | None = None) -> tuple[EstimateItem, ...]:
@@ -140,30 +117,27 @@ def onward(ways: Sequence[Way], motions: Motions, hand: Hand | None = None) -> t
     items = []
     for way in ways:
         if way.part == "head":
-            items.append(_question(_gaze(way.target), _left(way, motions.gazes), "degrees"))
+            items.append(_question(_gaze(way.target), _left(way, motions), "degrees"))
         else:
-            named = hand_of(motions.point(CURRENT_POSE, way.target)) or hand
-            items.append(_question(_point(way.target, named), _left(way, motions.points), "degrees"))
+            named = hand_of(motions.known[way._replace(since=CURRENT_POSE)]) or hand
+            items.append(_question(_point(way.target, named), _left(way, motions), "degrees"))
     return tuple(items)
 
 
 def onward_told(ways: Sequence[Way], motions: Motions, answers: Sequence[Estimate]) -> Motions:
     """Add the motions of a second question. ways, answers: of `onward`."""
-    gazes, points = dict(motions.gazes), dict(motions.points)
-    for way, answer in zip(ways, answers, strict=True):
-        (gazes if way.part == "head" else points)[way.since, way.target] = answer
-    return replace(motions, gazes=gazes, points=points)
+    return replace(motions, known=motions.known | dict(zip(ways, answers, strict=True)))
 
 
 def distinct(sequence: Iterable[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(sequence))
 
 
-def _left(way: Way, known: dict[tuple[str, str], Estimate]) -> BodyPose | None:
+def _left(way: Way, motions: Motions) -> BodyPose | None:
     """The pose in which a way starts."""
     if way.since == AT_REST:
-        return known[CURRENT_POSE, way.target].pose_end
-    return known[CURRENT_POSE, way.since].pose_after
+        return motions.known[way._replace(since=CURRENT_POSE)].pose_end
+    return motions.known[Way(way.part, CURRENT_POSE, way.since)].pose_after
 
 
 def _gaze(target: str) -> Gaze:

@@ -1,4 +1,8 @@
-"""Pairs of a gesture and a phrase, as far as posture does not matter: distractors, reliability, and what may win."""
+"""Pairs of a gesture and a phrase, as far as posture does not matter: distractors, reliability, and what may win.
+
+A reference is understood with reliability R(j, s) = 1 / (|D| + 1 / r), thesis 3.3.2: D are the other objects that it
+may seem to mean, and r is the reliability of its channel, a gesture j with a phrase s.
+"""
 
 from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
@@ -19,8 +23,36 @@ from engage_hri.services.generation.references.distractors import (
     in_zone,
     laid_out,
 )
-from engage_hri.services.generation.references.motions import CURRENT_POSE, Motions
-from engage_hri.services.generation.references.reliability import channel_reliability, reliability
+from engage_hri.services.generation.references.motions import CURRENT_POSE, Motions, Way
+
+
+def reliability(distractors: int, channel: Probability) -> Probability:
+    """Likelihood that the reference is understood: 1 / (|D| + 1/r). Thesis 3.3.2.
+
+    distractors: |D(j, s)|, objects besides the target still possible, >= 0.
+    channel: r(j, s) in [0, 1); with 0 (neither gesture nor phrase) the reliability is 0, too (decision B2).
+    Raises ValueError outside.
+    """
+    if distractors < 0:
+        raise ValueError(f"{distractors} distractors")
+    if not 0 <= channel < 1:
+        raise ValueError(f"channel reliability {channel} is not in [0, 1)")
+    return 1 / (distractors + 1 / channel) if channel else 0.0
+
+
+def channel_reliability(gesture: GestureChoice, phrase: str, config: GenerationConfig) -> Probability:
+    """Channel r(j, s) of a gesture with a phrase (empty: none), as configured. Thesis 3.3.2, decision B1."""
+    r_gesture = {
+        "none": 0.0,
+        "gaze": config.gaze_reliability,
+        "directed_gaze": config.directed_gaze_reliability,
+        "directed_gaze_with_pointing": config.pointing_reliability,
+    }[gesture]
+    r_phrase = config.phrase_reliability if phrase else 0.0
+    if config.channel == "sum":
+        return r_gesture + r_phrase
+    return 1 - (1 - r_gesture) * (1 - r_phrase)
+
 
 GESTURES: tuple[GestureChoice, ...] = get_args(GestureChoice)
 """All gestures, the set J of the thesis, from fewer movements to more."""
@@ -85,8 +117,8 @@ class Shown(Struct, frozen=True):
 
 def shown(targets: Sequence[str], scene: ReferenceScene, motions: Motions) -> dict[str, Shown]:
     """Objects that gazes and points at the targets may seem to mean."""
-    gazes = {each: ray for each in targets if (ray := motions.gaze(CURRENT_POSE, each).ray) is not None}
-    points = {each: ray for each in targets if (ray := motions.point(CURRENT_POSE, each).ray) is not None}
+    gazes = {each: ray for each in targets if (ray := motions.known[Way("head", CURRENT_POSE, each)].ray) is not None}
+    points = {each: ray for each in targets if (ray := motions.known[Way("arm", CURRENT_POSE, each)].ray) is not None}
     cones = in_gaze_cones(list(gazes.values()), scene.half_angle, scene.layout)
     cylinders = in_pointing_cylinders(list(points.values()), scene.pointing_radius, scene.layout)
     gazed, pointed = dict(zip(gazes, cones, strict=True)), dict(zip(points, cylinders, strict=True))
@@ -110,7 +142,6 @@ def considered(
         for option in reference.options or ()
     ]
     minimum = minimum_of(reference, config)
-    reliabilities: dict[tuple[int, Probability], tuple[Probability, bool]] = {}
     pairs = []
     for gesture in GESTURES:
         points = gesture == POINT
@@ -120,10 +151,7 @@ def considered(
         for order, option in enumerate(reference.options or ()):
             channel = channels["words" if option.text else ""]
             distractors = left & said[order]
-            counted = len(distractors), channel
-            if (known := reliabilities.get(counted)) is None:
-                value = reliability(*counted)
-                known = reliabilities[counted] = value, below(value, minimum)
+            value = reliability(len(distractors), channel)
             ruled_out = obstacle
             if option.deictic and not points:
                 ruled_out = "a deictic phrase needs a point"
@@ -137,9 +165,9 @@ def considered(
                     distractors=distractors,
                     by_look=frozenset() if points or not option.text else said[order] - distractors,
                     channel=channel,
-                    reliability=known[0],
+                    reliability=value,
                     ruled_out=ruled_out,
-                    is_short=known[1],
+                    is_short=round(value - minimum, ROUNDING) < 0,
                 )
             )
     return tuple(pairs)
@@ -209,10 +237,6 @@ def refusal(verb: str, motion: Estimate) -> str:
     return f"cannot {verb}: {motion.fault.reason if motion.fault else 'the body refuses'}"
 
 
-def below(value: Probability, minimum: Probability) -> bool:
-    return round(value - minimum, ROUNDING) < 0
-
-
 def deictic_warnings(references: Collection[Reference], scene: ReferenceScene) -> list[str]:
     """Warnings of deictic phrases with a list of distractors that are not all other objects (decision B8)."""
     return [
@@ -227,7 +251,7 @@ def deictic_warnings(references: Collection[Reference], scene: ReferenceScene) -
 
 def _obstacles(target: str, scene: ReferenceScene, motions: Motions) -> tuple[str, str]:
     """Reasons why the robot cannot look, and cannot point, at `target`; each empty if it can (decision B9)."""
-    gaze, point = motions.gaze(CURRENT_POSE, target), motions.point(CURRENT_POSE, target)
+    gaze, point = motions.known[Way("head", CURRENT_POSE, target)], motions.known[Way("arm", CURRENT_POSE, target)]
     no_gaze = scene.no_gaze or refusal("look", gaze)
     no_point = scene.no_point or refusal("point", point)
     entity = scene.world.entity(target)

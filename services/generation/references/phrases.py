@@ -5,10 +5,12 @@ expressions, Cognitive Science 19, 1995): a noun, and modifiers that hold of the
 ends with one phrase; here the reference policy weighs words against gestures, so it is offered each phrase that no
 other one of as few words beats, from "the square" to "the big red square". As with them the noun is always said,
 the order of preference decides between equals, and what is not known of an object does not rule it out.
+
+What was referred to in a turn and the one before is remembered, for what "it" can mean. Pure.
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from functools import cached_property
 from itertools import combinations, pairwise
 from typing import get_args
@@ -17,12 +19,64 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Reference, SpeechOption
+from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.text import word_count
 from engage_hri.schemas.units import Meters
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.generation.config import PhraseAttribute
-from engage_hri.services.generation.references.discourse import NO_DISCOURSE, Discourse
 from engage_hri.services.generation.references.distractors import extent
+
+
+class Named(Struct, frozen=True):
+    """An object that a fragment refers to."""
+
+    fragment: str
+    object: str
+
+
+class Discourse(Struct, frozen=True):
+    """The objects referred to. named: in the turn. before: in the turn before it. addressee: the person who heard."""
+
+    turn: str = ""
+    addressee: str = ""
+    named: tuple[Named, ...] = ()
+    before: tuple[Named, ...] = ()
+
+    def in_turn(self, turn: str, addressee: str) -> "Discourse":
+        """The discourse at a fragment of `turn`. For another addressee nothing was referred to before."""
+        if turn == self.turn:
+            return self
+        before = self.named if addressee == self.addressee else ()
+        return Discourse(turn=turn, addressee=addressee, before=before)
+
+    def naming(self, fragment: str, objects: Collection[str]) -> "Discourse":
+        """The discourse after a fragment that refers, or is going to refer, to `objects`."""
+        return replace(self, named=(*self.named, *(Named(fragment, each) for each in objects)))
+
+    def without(self, fragment: str, unmentioned: Collection[str]) -> "Discourse":
+        """The discourse after a fragment that has ended before it referred to the objects in `unmentioned`."""
+
+        def said(named: tuple[Named, ...]) -> tuple[Named, ...]:
+            return tuple(each for each in named if each.fragment != fragment or each.object not in unmentioned)
+
+        return replace(self, named=said(self.named), before=said(self.before))
+
+    def hearing(self, event: ConnectionEvent, robot: str) -> "Discourse":
+        """The discourse after an event: a person who directs to something else ends the topic of "it"."""
+        directs = event.kind == "directed_gaze" and event.state == "started" and event.initiator != robot
+        if not directs or not event.objects or set(event.objects) == {self.topic}:
+            return self
+        return replace(self, named=(), before=())
+
+    @property
+    def topic(self) -> str:
+        """The only object that was referred to: in the turn or, as long as nothing was in it, in the one before."""
+        objects = {each.object for each in self.named or self.before}
+        return objects.pop() if len(objects) == 1 else ""
+
+
+NO_DISCOURSE = Discourse()
+
 
 PHRASE_ATTRIBUTES: tuple[PhraseAttribute, ...] = ("color", "shape", "feature", "size")
 """Attributes that proposed phrases may say beside the noun, the most preferred first: absolute before relative, as

@@ -13,7 +13,7 @@ from engage_hri.schemas.behaviors import Hand, Reference
 from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.schemas.fragments import PairConsidered, ReferenceChoice
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.references.motions import CURRENT_POSE, Motions, distinct, hand_of
+from engage_hri.services.generation.references.motions import CURRENT_POSE, Motions, Way, distinct, hand_of
 from engage_hri.services.generation.references.pairs import (
     POINT,
     ROUNDING,
@@ -24,8 +24,7 @@ from engage_hri.services.generation.references.pairs import (
     deictic_warnings,
     shown,
 )
-from engage_hri.services.generation.references.posture import HeadAndArms
-from engage_hri.services.generation.references.sequence import Movements, cheapest
+from engage_hri.services.generation.references.sequence import HeadAndArms, Movements, cheapest
 from engage_hri.services.runtime.steps import Steps, finished
 
 FROM_NOWHERE = "cannot be done from where the references before it leave the body"
@@ -85,7 +84,7 @@ def choice(
     config: GenerationConfig,
     apart: Collection[str] = (),
 ) -> Steps[Choices]:
-    """Choose as `choose` does, with tables from `weigh`. Raises NotAsked, too: the body is to be asked for more."""
+    """Choose as `choose` does, with tables from `weigh`."""
     best = yield from cheapest(tables, motions, config, apart)
     explained: list[ReferenceChoice] = []
     for table, pair, posture in zip(tables, best.pairs, best.postures, strict=False):
@@ -107,7 +106,7 @@ def choice(
                 f"{table.reference.id}: {pair.option.text!r} may mean {len(pair.by_look) + 1} objects, and the look "
                 "alone tells which (a higher certainty, or minimum reliability, asks for a point, if one is possible)"
             )
-        if made.gesture == POINT and (hand := hand_of(motions.point(CURRENT_POSE, made.target))):
+        if made.gesture == POINT and (hand := hand_of(motions.known[Way("arm", CURRENT_POSE, made.target)])):
             hands[made.reference] = hand
     return Choices(choices, tuple(warnings), hands)
 

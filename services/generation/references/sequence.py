@@ -1,22 +1,91 @@
 """The cheapest sequence of pairs for some references: a dynamic program over what head and arms are on. Pure.
 
-The same walk over the postures, without costs, says which motions the program will need: it meets every posture that
-the program meets, as long as the body is asked until there is nothing left to ask.
+Before each reference head and arms are on the target of the one before, or at rest (decision 0024). The same walk
+over these postures, without costs, says which motions the program will need: it meets every posture that the program
+meets, as long as the body is asked until there is nothing left to ask.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from msgspec import Struct
 from msgspec.structs import replace
 
+from engage_hri.schemas.behaviors import Constraint, FragmentBehavior, Reference, Speech, Wait
 from engage_hri.schemas.fragments import GestureChoice
+from engage_hri.schemas.references import BLOCK_ITSELF, SyncRef
+from engage_hri.schemas.text import word_count
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.references.motions import CURRENT_POSE, Motions, Way, arm_of
+from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE, Motions, Way, arm_of
 from engage_hri.services.generation.references.pairs import POINT, ROUNDING, Pair, Table, refusal, speaking
-from engage_hri.services.generation.references.posture import HeadAndArms
 from engage_hri.services.runtime.steps import Steps
+
+
+class HeadAndArms(Struct, frozen=True):
+    """Targets of the head and of each arm: that of a reference, the person glanced at, CURRENT_POSE or AT_REST."""
+
+    head: str = CURRENT_POSE
+    arms: tuple[tuple[str, str], ...] = ()
+    """(arm, target) of the arms that have moved, by arm."""
+
+    def arm(self, arm: str) -> str:
+        for each, target in self.arms:
+            if each == arm:
+                return target
+        return CURRENT_POSE
+
+    def afterwards(self, target: str, arm: str, motions: Motions) -> Mapping[GestureChoice, "HeadAndArms"]:
+        """The postures that the gestures at `target` leave: what one does not use goes home. arm: that points."""
+        home = self.home_again(motions)
+        looking = HeadAndArms(target, home.arms)
+        moved = tuple(sorted([each for each in home.arms if each[0] != arm] + [(arm, target)]))
+        pointing = HeadAndArms(motions.glance or target, moved)
+        return {
+            "none": home,
+            "gaze": looking,
+            "directed_gaze": looking,
+            "directed_gaze_with_pointing": pointing,
+        }
+
+    def home_again(self, motions: Motions) -> "HeadAndArms":
+        """The posture once all is over that a reference has moved. A glance lasts until the next look."""
+        moved = self.head not in (CURRENT_POSE, motions.glance) and not motions.looks_last
+        return HeadAndArms(AT_REST if moved else self.head, tuple([(arm, AT_REST) for arm, _ in self.arms]))
+
+
+def references_apart(
+    order: Sequence[FragmentBehavior], constraints: Sequence[Constraint], most_words: float
+) -> frozenset[str]:
+    """Ids of the references before which head and arms go home, since too much lies between (decision 0024).
+
+    Too much are more than `most_words` words of plain speech, a `Wait`, or a clock time: how long that leaves an arm
+    in the air nobody knows. order: of the fragment's behaviors.
+    """
+    apart = set(_by_the_clock(order, constraints))
+    words, waits = 0.0, False
+    for behavior in order:
+        if isinstance(behavior, Reference):
+            if waits or words > most_words:
+                apart.add(behavior.id)
+            words, waits = 0.0, False
+        elif isinstance(behavior, Speech):
+            words += word_count(behavior.text)
+        elif isinstance(behavior, Wait):
+            waits = True
+    return frozenset(apart)
+
+
+def _by_the_clock(order: Sequence[FragmentBehavior], constraints: Sequence[Constraint]) -> Iterator[str]:
+    """Ids of the references that something ties to a clock time, or to another block."""
+    references = {behavior.id for behavior in order if isinstance(behavior, Reference)}
+    tied: list[Collection[str]] = [(f"{each.id}:start", timing.ref) for each in order for timing in each.timing]
+    tied += [(operator.ref, *operator.syncs) for each in constraints for operator in each.operators]
+    for texts in tied:
+        refs = [SyncRef.parse(text) for text in texts if text]
+        if any(ref.block or ref.behavior in ("", BLOCK_ITSELF) for ref in refs):
+            yield from (ref.behavior for ref in refs if ref.behavior in references)
+
 
 EXPECTED_DELAY: Seconds = 0.3
 """Expected delay of directed gaze, E[delay]: the mean of Table 2.1. Its cost is set by `generation.wait_weight`.
@@ -64,7 +133,7 @@ class Movements:
         self._target = target
         self._motions = motions
         self._config = config
-        self.arm = arm_of(motions.point(CURRENT_POSE, target))
+        self.arm = arm_of(motions.known[Way("arm", CURRENT_POSE, target)])
         self._made: dict[tuple[str, str], Mapping[GestureChoice, Made]] = {}
 
     def ways(self, posture: HeadAndArms) -> tuple[Way, Way]:
@@ -83,16 +152,16 @@ class Movements:
 
     def _from(self, head: str, arm: str) -> Mapping[GestureChoice, Made]:
         config = self._config
-        gaze, point = self._motions.gaze(head, self._target), self._motions.point(arm, self._target)
+        gaze = self._motions.known[Way("head", head, self._target)]
+        point = self._motions.known[Way("arm", arm, self._target)]
         no_gaze = refusal("look from there", gaze)
-        look, wait = config.head_cost(gaze.head_degrees), config.wait_weight * EXPECTED_DELAY
+        look, wait = config.seconds_per_head_degree * gaze.head_degrees, config.wait_weight * EXPECTED_DELAY
+        swing = config.seconds_per_arm_degree * point.arm_degrees
         return {
             "none": Made("", ()),
             "gaze": Made(no_gaze, (look,)),
             "directed_gaze": Made(no_gaze, (look, wait)),
-            POINT: Made(
-                no_gaze or refusal("point from there", point), (look, wait, config.arm_cost(point.arm_degrees))
-            ),
+            POINT: Made(no_gaze or refusal("point from there", point), (look, wait, swing)),
         }
 
 
@@ -109,7 +178,7 @@ def unasked(
         movements = Movements(reference.target, motions, config)
         is_known = {}
         for posture in postures:
-            missing = [way for way in movements.ways(posture) if not motions.has(way)]
+            missing = [way for way in movements.ways(posture) if way not in motions.known]
             is_known[posture] = not missing
             wanted |= dict.fromkeys(missing)
         onward: dict[HeadAndArms, None] = {}

@@ -1,10 +1,14 @@
 """The turn policy: what a turn fragment adds to a conversation (thesis Table 3.1), and which fragments may follow.
 
+A person who ends a turn says so in three ways at once: the words stop, the eyes meet the hearer's, and the voice is
+at its lowest (thesis 3.3.1). A robot that does none of this leaves the other to guess whose turn it is. So a turn
+that begins announces to recognition which answer is awaited, and one that ends looks at the addressee in a low voice.
+
 Fragments of one turn arrive one by one while earlier ones are still performed. The policy follows the turn as it
 was accepted; whatever ends it early (barge-in, fault, cancellation, silence) also ends the fragments in line.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from typing import Literal
 
 from msgspec import Struct
@@ -16,10 +20,9 @@ from engage_hri.schemas.fragments import TurnFragment, TurnStatus
 from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.requests import are_of_one_run
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.sight import Sight
+from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.reports.action_reports import FACE_GRACE
-from engage_hri.services.requests.deadlines import Silences
 from engage_hri.services.text.listening import is_listening
 
 TURN_SILENCE: Seconds = 10.0
@@ -293,7 +296,11 @@ class TurnPolicy:
     @property
     def _limits(self) -> dict[tuple[str, str], Seconds]:
         """Times until which others may go on as they do: be away or talk, by person, and be silent, by turn."""
-        limits = {("talks", each): self._takes_floor_at(each, began) for each, began in self._talked_into.items()}
+        limits = {}
+        for actor, began in self._interrupters.items() if self._robot_speaks and self._live else ():
+            if began is not None:  # talks into what the robot says now
+                patience = LONGEST_LISTENING if actor in self._listeners else self._config.barge_in
+                limits["talks", actor] = began + patience
         if self._silent_since is not None:
             limits["silent", self.open_turn] = self._silent_since + TURN_SILENCE
         people = {plan.addressee for plan in self._turns_under_way}
@@ -302,16 +309,6 @@ class TurnPolicy:
     @property
     def deadline(self) -> Seconds | None:
         return min((self._waits.standing(*each) for each in self._limits.items()), default=None)
-
-    @property
-    def _talked_into(self) -> dict[str, Seconds]:
-        """People who talk into what the robot says now, and since when."""
-        if not self._robot_speaks or not self._live:
-            return {}
-        return {actor: began for actor, began in self._interrupters.items() if began is not None}
-
-    def _takes_floor_at(self, actor: str, began: Seconds) -> Seconds:
-        return began + (LONGEST_LISTENING if actor in self._listeners else self._config.barge_in)
 
     def tick(self, now: Seconds) -> Aborted | None:
         """Abort the turn that silence, a barge-in or the leaving of its addressee has ended by `now`; None: none."""
@@ -367,25 +364,17 @@ def _refused(id: str, why: Fault) -> Fault:
     return why.following(refused, "") if why.reason else Fault(reason=refused)
 
 
-def in_vain(fragment: TurnFragment) -> tuple[str, ...]:
+def in_vain(fragment: TurnFragment) -> Iterator[str]:
     """Warnings for what a fragment asks for in vain: holding a turn that is not held, time that nobody waits."""
-    return (*_vain_delay(fragment), *_vain_within(fragment))
-
-
-def _vain_delay(fragment: TurnFragment) -> tuple[str, ...]:
+    status = fragment.turn_status
     if fragment.delay_target and not fragment.delay:
-        return ("delayTarget without delay='true': the turn is not held",)
-    if fragment.delay and fragment.turn_status not in ("beginning", "middle"):
-        return (f"delay: after {fragment.turn_status!r} there is no turn to hold",)
-    if fragment.delay and not fragment.delay_target:
-        return ("delay: the world has no surface to look at; name a delayTarget",)
-    return ()
-
-
-def _vain_within(fragment: TurnFragment) -> tuple[str, ...]:
-    if fragment.within is None or (TABLE[fragment.turn_status].opens and fragment.turn_index == 1):
-        return ()
-    return ("within: an answer is awaited where a first turn begins, with 'beginning' or 'full'",)
+        yield "delayTarget without delay='true': the turn is not held"
+    elif fragment.delay and status not in ("beginning", "middle"):
+        yield f"delay: after {status!r} there is no turn to hold"
+    elif fragment.delay and not fragment.delay_target:
+        yield "delay: the world has no surface to look at; name a delayTarget"
+    if fragment.within is not None and not (TABLE[status].opens and fragment.turn_index == 1):
+        yield "within: an answer is awaited where a first turn begins, with 'beginning' or 'full'"
 
 
 def _illegal(fragment: TurnFragment, field: str, reason: str, advice: str) -> InputRefused:

@@ -12,13 +12,12 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.sight import Sight
+from engage_hri.services.bus.deadlines import Sight
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.decide.grants import Grants
 from engage_hri.services.realizer.decide.lateness import HeldUp, Late, LatenessWatch, Stalled
 from engage_hri.services.realizer.foresee.expectations import Foresight, Pace, differ_noticeably
-from engage_hri.services.realizer.net.clocks import NO_STOPS, Stops
-from engage_hri.services.realizer.net.facts import Facts
+from engage_hri.services.realizer.net.facts import NO_STOPS, Facts, Stops
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.plan import Broken, Plan, Promises
 from engage_hri.services.realizer.points import ORIGIN, Point, performer, stands_soon
@@ -106,8 +105,9 @@ class Decisions:
         self.lateness_watch = LatenessWatch(config, sight or Sight("realizer"))
         self._unwatched: set[str] = set()
         """Behaviors about which there is news, so that another report of theirs is to be expected than before."""
-        self._asked_at: dict[str, Seconds] = {}
-        """Time at which each behavior was really asked to begin (see `count_from`)."""
+        self._awaited_since: dict[str, Seconds] = {}
+        """Time from which the start of each behavior is awaited. A loop that is late gets to that long after this was
+        decided, and the body cannot be blamed for it."""
         self._asking: dict[str, Point] = {}
         """Behaviors that were told to pass a point, and are to ask again: something was held since."""
         self._kept_back: set[str] = set()
@@ -244,11 +244,6 @@ class Decisions:
         """True if the behaviors of the block are being ended, whatever was planned."""
         return self._is_ending()
 
-    @property
-    def is_over(self) -> bool:
-        """True if everything has happened that the end of the block waits for."""
-        return self.net.is_over
-
     def broken(self, point: Point) -> list[Broken]:
         """Constraints that are broken, now that a point was reached: one of this block, or of another.
 
@@ -364,15 +359,6 @@ class Decisions:
         )  # fmt: skip
         return min((at for at in alarms if at is not None), default=None)
 
-    def count_from(self, behavior: str, now: Seconds) -> None:
-        """Count from now on how late a behavior is with its start: the body is not asked before.
-
-        A loop that is late asks long after this was decided. The body cannot be blamed for that.
-        """
-        self._asked_at[behavior] = now
-        self.lateness_watch.acquit(behavior)
-        self._watch(behavior, now)
-
     def _watch(self, behavior: str, now: Seconds) -> None:
         """Expect the next report of a behavior that is under way."""
         chain, facts = self.plan.chains.get(behavior), self.facts
@@ -384,8 +370,7 @@ class Decisions:
         if number >= len(points) or waits or facts.is_held(behavior):
             self.lateness_watch.forget(behavior)
             return
-        begun = self._asked_at.get(behavior, facts.begun[behavior])
-        since = facts.reached[points[number - 1]] if number else begun
+        since = facts.reached[points[number - 1]] if number else self._awaited_since.setdefault(behavior, now)
         natural = chain.segments[number - 1].natural if number else 0.0
         asked = self.foresight.asked(points[number], since + natural)
         granted = self.grants.granted_at[behavior] if is_there else 0.0

@@ -190,7 +190,7 @@ class Grants(Observer):
         net, facts = self._net, self._facts
         theirs = frozenset(point for point in self._plan.foreign if point in elsewhere)
         firm = theirs & standing
-        known = (len(facts.reached), len(facts.arrived), len(facts.begun), len(net.instants))
+        known = (len(facts.reached), len(facts.arrived), len(facts.begun), len(net.fired))
         state = (facts.held, theirs, firm, known, facts.silent)
         if self._known_stuck is None or self._known_stuck[0] != state:
             self._known_stuck = (state, Stuck(self._plan, net, facts, theirs, firm, self._pauses, self._tied))

@@ -1,4 +1,4 @@
-"""Lateness: how long the next report and the decision of an event may take, and what holds account for.
+"""Lateness: how long the next report may take, and what holds account for.
 
 A behavior that reports nothing in time is told late, then given up: else a block with one dead arm never ends.
 
@@ -13,17 +13,12 @@ from collections.abc import Mapping
 
 from msgspec import Struct
 
-from engage_hri.schemas.behavior_types import canonical_sync
-from engage_hri.schemas.behaviors import Event, Speech
-from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.references import SyncRef, type_name
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.sight import Sight
+from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.realizer.config import LATE, RealizerConfig
 from engage_hri.services.realizer.foresee.expectations import Outlook
 from engage_hri.services.realizer.net.facts import STANDING
 from engage_hri.services.realizer.points import EPSILON, Point
-from engage_hri.services.requests.deadlines import Silences
 
 LATE_FACTOR = 1.0
 """Share of its natural time by which a phase may take longer besides: a long one misses by more. Ours."""
@@ -80,11 +75,6 @@ class LatenessWatch:
         self._alarms.clear((behavior, False))
         self._alarms.clear((behavior, True))
 
-    def acquit(self, behavior: str) -> None:
-        """Forget that the behavior was late: it had not been asked."""
-        self.forget(behavior)
-        self._warned.discard(behavior)
-
     @property
     def deadline(self) -> Seconds | None:
         """Time of the next call of `overdue` that may find something; None if no report is expected."""
@@ -102,32 +92,6 @@ class LatenessWatch:
                 self._warned.add(behavior)
                 found.append(Late(behavior, sync, now - expected))
         return found
-
-
-UNTOLD: Seconds = 2.5
-"""Limit of an event where neither the block nor recognition names one, because recognition is not there. Nobody can
-say then what the person does: the robot leaves the time in which most people follow a point or begin to answer."""
-GRACE: Seconds = 0.5
-"""Time after its limit at which an event ends as failed if recognition is not there to decide it."""
-
-
-def event_deadline(event: Event, block: Block, reached: Mapping[Point, Seconds]) -> Seconds:
-    """Time at which an event has failed, if recognition is not there to decide it.
-
-    The limit counts from the start or from the last of the anchors that are reached by now.
-    """
-    anchors = (reached.get(_point(text, block)) for text in event.anchors)
-    since = max(time for time in (reached[Point(event.id, "start")], *anchors) if time is not None)
-    return since + (event.limit or UNTOLD) + GRACE
-
-
-def _point(text: str, block: Block) -> Point:
-    ref = SyncRef.parse(text)
-    behavior = next((each for each in block.behaviors if each.id == ref.behavior), None)
-    if isinstance(behavior, Speech):
-        ref = SyncRef.parse(text, [mark.id for mark in behavior.marks])
-    sync = canonical_sync(ref.sync, type_name(behavior) if behavior else "", block.dialect)
-    return Point(ref.behavior, sync)
 
 
 class HeldUp:

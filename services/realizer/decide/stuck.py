@@ -55,7 +55,7 @@ class Stuck:
         self._silent = facts.silent
         self._running = self._later_than_moving(elsewhere - standing)
         """Instants that come nearer, since something that leads to them is on its way."""
-        unfired = {each for each in range(len(plan.members)) if each not in net.instants}
+        unfired = {each for each in range(len(plan.members)) if each not in net.fired}
         first = {each for each in unfired if any(map(self._is_held, plan.members[each]))}
         self.instants: Set[int] = frozenset()
         while first:
@@ -107,7 +107,7 @@ class Stuck:
             chain, number = self._plan.chains[behavior], facts.next_number(behavior)
             if not self._has_stopped(behavior) and not facts.holds(chain.points[number]):
                 moving.add(at[chain.points[number]])
-        fired = self._net.instants
+        fired = self._net.fired
         clocks = (each for each in self._plan.net.places if each.lag > 0.0 and each.kind != "phase")
         begun = {each.target for each in clocks if each.source in fired and each.target not in fired}
         found = self._plan.net.later(moving | {each for each in begun if self._net.ripe_at(each) < inf})

@@ -1,8 +1,8 @@
 """Expectations of a running block as its news come: what was measured, said, held, and what other blocks expect.
 
 They say "not before"; who is released by a measured event need not ask them. So they may fall behind: what they are
-told waits until `update`. What is asked of them is in `Foresight`: when each point is expected, and at what pace the
-behaviors are to move for that.
+told waits until `update`. Asked of them is when each point is expected, and at what pace the behaviors are to move
+for that.
 """
 
 import heapq
@@ -13,6 +13,7 @@ from typing import Any
 
 from msgspec import Struct
 
+from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.foresee.forecast import Forecast, full_forecast, is_predictive
 from engage_hri.services.realizer.foresee.pace import SHORT, Experience, Interval, Utterances
@@ -20,7 +21,7 @@ from engage_hri.services.realizer.net.facts import Facts
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.known import BLOCK_END, BLOCK_START
 from engage_hri.services.realizer.plan.plan import BRAKING, Plan, slack
-from engage_hri.services.realizer.points import EPSILON, ORIGIN, SHIFTS, Member, Point, frozen, performer, stands_soon
+from engage_hri.services.realizer.points import EPSILON, ORIGIN, SHIFTS, Member, Point, frozen, stands_soon
 
 
 class Outlook(Struct, frozen=True):
@@ -45,7 +46,7 @@ Pace = tuple[tuple[str, Seconds], ...]
 """Sync points and their instants, by loop time, where the behavior's natural pace would miss them; else empty."""
 
 
-class Expectations(Observer):
+class Foresight(Observer):
     """Expectations of a block.
 
     paces: the pace that each behavior was last told. paced: those that ever hurried or dawdled: a gesture that was
@@ -126,7 +127,7 @@ class Expectations(Observer):
     def none_before(self, now: Seconds) -> None:
         """Expect nothing that has not happened before now: what was held has not come in the meantime."""
         if (forecast := self.forecast) is not None:
-            coming = [each for each in range(len(self.plan.members)) if each not in self._net.instants]
+            coming = [each for each in range(len(self.plan.members)) if each not in self._net.fired]
             self._news += [(forecast.overdue, each, now) for each in coming]
 
     def go_on(self, behavior: str, now: Seconds) -> None:
@@ -223,8 +224,9 @@ class Expectations(Observer):
         before, natural = chain.points[number - 1], chain.segments[number - 1].natural
         if self.utterances.follows(point.behavior):
             self._learn_words(point.behavior, self.utterances.interval(point.behavior, to_point=True), at)
-        elif natural >= SHORT and performer(chain.behavior) == "body":
-            if self.plan.predicted(point) - self.plan.predicted(before) < natural - EPSILON:
+        elif natural >= SHORT and TYPES[chain.type].performer == "body":
+            schedule, at_instant = self.plan.schedule, self.plan.at
+            if schedule[at_instant[point]] - schedule[at_instant[before]] < natural - EPSILON:
                 return  # it was to be cut short
             since = self._facts.reached[before]
             is_beneath = chain.type in SHIFTS and at - since < natural  # perhaps: a look has begun over it
@@ -352,9 +354,7 @@ class Expectations(Observer):
         before, here = (self.plan.at[point] for point in chain.points[number - 1 : number + 1])
         return 0.0 if before == here else self.forecast.phase(behavior, here)
 
-
-class Foresight(Expectations):
-    """Answers from what is expected of a block."""
+    # -- questions -----------------------------------------------------------------------------------------------
 
     def due(self, transition: int, ripe: Seconds) -> Seconds:
         """Time at which an instant is due, no earlier than all that it waits for is `ripe`."""
@@ -469,7 +469,7 @@ class Foresight(Expectations):
         if (forecast := self.forecast) is not None:
             self.catch_up()
         else:
-            known = (self.foreseen, facts.reached, facts.arrived, self._net.instants)
+            known = (self.foreseen, facts.reached, facts.arrived, self._net.fired)
             heard = self.utterances.since
             forecast = full_forecast(self.plan, facts.began, self.experience.factor, *known, self._prolonged, heard)
         return forecast.as_of(now, self._stood(now))

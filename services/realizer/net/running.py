@@ -16,7 +16,7 @@ from math import inf
 from typing import NamedTuple
 
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.net.clocks import Clocks
+from engage_hri.services.bus.deadlines import Deadlines
 from engage_hri.services.realizer.net.petri_net import Marking, PetriNet
 from engage_hri.services.realizer.points import EPSILON, Member, Point
 
@@ -53,12 +53,81 @@ class _Audience(NamedTuple):
     fired: list[Callable[[int, Seconds], None]]
 
 
+class Clocks:
+    """The time at which the token in each place will be ripe, for tokens that are not."""
+
+    def __init__(self) -> None:
+        self._due: Deadlines[int] = Deadlines(int)
+        self._left: dict[int, Seconds] = {}
+
+    @property
+    def stopped(self) -> Mapping[int, Seconds]:
+        """Places whose clocks are stopped, with the seconds that are left."""
+        return self._left
+
+    @property
+    def next(self) -> Seconds | None:
+        """Time at which the next token is ripe; None: no clock runs."""
+        return self._due.earliest
+
+    def set(self, place: int, at: Seconds, now: Seconds, *, is_stopped: bool) -> None:
+        """Let the token in `place` be ripe at `at`; later by as long as the clock is stopped, from `now` on."""
+        if is_stopped:
+            self._left[place] = at - now
+        else:
+            self._due.set(place, at)
+
+    def ripe(self, now: Seconds) -> tuple[int, Seconds] | None:
+        """Remove the first token that is ripe by `now`; returns its place, and since when. None: there is none."""
+        at = self._due.earliest
+        if at is None or at > now or (place := self._due.due(now)) is None:
+            return None
+        return place, at
+
+    def stop(self, is_held: Callable[[int], bool], now: Seconds) -> dict[int, Seconds]:
+        """Stop the clocks of the places that are held now, and let all others run.
+
+        Returns the places whose clocks go on, each with the time at which its token is ripe now.
+        """
+        for place in [each for each in self._due if is_held(each)]:
+            at = self._due[place]
+            assert at is not None
+            self._due.clear(place)
+            self._left[place] = at - now
+        going_on = {place: now + left for place, left in self._left.items() if not is_held(place)}
+        for place, at in going_on.items():
+            del self._left[place]
+            self.set(place, at, now, is_stopped=False)
+        return going_on
+
+
+class Instant:
+    """One transition while the net runs: what is there, and what it lacks before it can fire.
+
+    members: parts of behaviors in it. absent: number of those that have not passed it. lacking: places before it
+    without a token, and behaviors that have yet to begin: without any it is open, and all that it waits for is on its
+    way. missing: behaviors that have not passed it, and places before it without a ripe token: without any it fires.
+    latest: time at which the last behavior passed it. since: at which the last came of all that has come. ripe: at
+    which the tokens that lie before it are ripe, or were. is_before_end: the end of the block waits for it.
+    """
+
+    __slots__ = ("absent", "is_before_end", "lacking", "latest", "members", "missing", "ripe", "since")
+
+    def __init__(self, members: Sequence[Member]) -> None:
+        self.members = members
+        self.absent = self.missing = len(members)
+        self.lacking = 0
+        self.latest = self.since = self.ripe = -inf
+        self.is_before_end = False
+
+
 class RunningNet:
     """A marking that runs, from the initial one to the initial one.
 
     members: for each transition, the behaviors' parts in it. at: the transition of each point. observers: told of
-    everything, in this order. instants: the time at which each transition fired. passed: the time at which the last
-    of its behaviors passed it, which may be before it fires. end: the transition that ends the block.
+    everything, in this order. instants: all transitions. fired: the time at which each fired, in that order. passed:
+    the time at which the last of its behaviors passed it, which may be before it fires. end: the transition that ends
+    the block.
     """
 
     def __init__(
@@ -68,12 +137,11 @@ class RunningNet:
         at: Mapping[Point, int],
         observers: Sequence[Observer] = (),
     ) -> None:
-        size = len(net.transitions)
         self.net = net
-        self.instants: dict[int, Seconds] = {}
+        self.instants = [Instant(each) for each in members]
+        self.fired: dict[int, Seconds] = {}
         self.passed: dict[int, Seconds] = {}
         self.at = at
-        self._members = members
         self._told = _Audience([], [], [], [], [])
         self.observe(observers)
         self._tokens = bytearray(RIPE * count for count in net.initial)
@@ -84,12 +152,6 @@ class RunningNet:
         """Places whose clocks were stopped for a while, and for how long."""
         self._held: Collection[str] | None = ()
         """Behaviors whose clocks are stopped; None: all clocks are."""
-        self._latest = [-inf] * size
-        """For each transition, the time at which the latest behavior passed it."""
-        self._since = [-inf] * size
-        """For each transition, the time at which the last came of what has come there."""
-        self._ripe = [-inf] * size
-        """For each transition, the time at which the tokens that lie before it are ripe, or were."""
         self._firing: list[tuple[int, Seconds]] = []
         """Transitions that fire now, the first is at it."""
         parts = {(each.behavior, number): each for number, group in enumerate(members) for each in group}
@@ -104,12 +166,6 @@ class RunningNet:
         """Places that a behavior puts a token into as it passes a transition, apart from its phases."""
         self._put_at: dict[int, Seconds] = {}
         """For each place with a clock, when its token was put."""
-        self._absent = [len(each) for each in members]
-        """For each transition, the number of behaviors that have not passed it."""
-        self._lacking = [0] * size
-        """For each transition, the places before it without a token, and the behaviors that have yet to begin."""
-        self._missing = [len(each) for each in members]
-        """For each transition, the behaviors that have not passed it, and places before it without a ripe token."""
         for number, place in enumerate(net.places):
             if place.kind == "phase":
                 self._into[parts[place.behavior, place.target].point] = number
@@ -119,49 +175,43 @@ class RunningNet:
                 point = parts[place.after, place.source].point
                 self._after[point] = (*self._after.get(point, ()), number)
             if place.kind not in ("handover", "idle"):
-                self._lacking[place.target] += 1
-                self._missing[place.target] += 1
+                self.instants[place.target].lacking += 1
+                self.instants[place.target].missing += 1
         stations: dict[str, list[int]] = {}
         for transition, group in enumerate(members):
             for member in group:
                 if member.kind != "start" and ":" not in member.behavior:
                     stations.setdefault(member.behavior, []).append(transition)
-                    self._lacking[transition] += 1
+                    self.instants[transition].lacking += 1
         self._stations = {behavior: tuple(each) for behavior, each in stations.items()}
         """For each behavior, the transitions that it comes to later than with its start."""
-        self.end = size - 1
-        self._before_end = self._leading_to_end()
-        self._lacking[self.end] = self._missing[self.end] = sum(self._before_end)
+        self.end = len(net.transitions) - 1
+        last = self.instants[self.end]
+        last.lacking = last.missing = self._mark_before_end()
 
     def observe(self, observers: Iterable[Observer]) -> None:
         """Tell these, too, what happens from now on."""
         for each in observers:
-            kind = type(each)
-            if kind.on_began is not Observer.on_began:
-                self._told.began.append(each.on_began)
-            if kind.on_arrived is not Observer.on_arrived:
-                self._told.arrived.append(each.on_arrived)
-            if kind.on_reached is not Observer.on_reached:
-                self._told.reached.append(each.on_reached)
-            if kind.on_opened is not Observer.on_opened:
-                self._told.opened.append(each.on_opened)
-            if kind.on_fired is not Observer.on_fired:
-                self._told.fired.append(each.on_fired)
+            for event, told in self._told._asdict().items():
+                name = f"on_{event}"
+                if getattr(type(each), name) is not getattr(Observer, name):
+                    told.append(getattr(each, name))
 
-    def _leading_to_end(self) -> bytearray:
-        """For each transition, 1 if the end of the block waits for it, or 0.
+    def _mark_before_end(self) -> int:
+        """Mark the transitions that the end of the block waits for; returns how many these are.
 
         Not among them are ends of events that may outlast it, and who takes a part by plan: a behavior that was early
         has gone home by itself.
         """
-        found = bytearray(len(self.net.transitions))
-        todo = [self.end]
+        todo, count = [self.end], 0
         while todo:
             for place in (self.net.places[each] for each in self.net.inputs[todo.pop()]):
-                if place.kind not in ("idle", "handover") and not found[place.source]:
-                    found[place.source] = 1
+                source = self.instants[place.source]
+                if place.kind not in ("idle", "handover") and not source.is_before_end:
+                    source.is_before_end = True
+                    count += 1
                     todo.append(place.source)
-        return found
+        return count
 
     # -- questions -----------------------------------------------------------------------------------------------
 
@@ -180,14 +230,14 @@ class RunningNet:
     @property
     def is_over(self) -> bool:
         """True if the end of the block has fired."""
-        return self.end in self.instants
+        return self.end in self.fired
 
     def is_open(self, transition: int) -> bool:
         """True if nothing but behaviors on their way, and clocks, is missing at a transition that has not fired.
 
         The start of the block is open for the behaviors that begin with it, though it has fired.
         """
-        return not self._lacking[transition] and (not transition or transition not in self.instants)
+        return not self.instants[transition].lacking and (not transition or transition not in self.fired)
 
     def ripe_at(self, transition: int) -> Seconds:
         """Time at which the tokens that other transitions have put before `transition` are ripe.
@@ -197,7 +247,7 @@ class RunningNet:
         stopped = self._clocks.stopped
         if stopped and any(place in stopped for place in self.net.inputs[transition]):
             return inf
-        return self._ripe[transition]
+        return self.instants[transition].ripe
 
     @property
     def next_ripe(self) -> Seconds | None:
@@ -240,10 +290,11 @@ class RunningNet:
                 self._set(place, TOKEN)
             for each in self._after.get(point, ()):
                 self._put(each, at)
-            self._latest[transition] = max(self._latest[transition], at)
-            self._absent[transition] -= 1
-            if not self._absent[transition]:
-                self.passed[transition] = self._latest[transition]
+            instant = self.instants[transition]
+            instant.latest = max(instant.latest, at)
+            instant.absent -= 1
+            if not instant.absent:
+                self.passed[transition] = instant.latest
             self._miss_less(transition, at)
 
     def tick(self, now: Seconds) -> None:
@@ -256,7 +307,7 @@ class RunningNet:
         self._held = behaviors
         for number, at in self._clocks.stop(self._is_held, now).items():
             place = self.net.places[number]
-            self._ripe[place.target] = max(self._ripe[place.target], at)
+            self.instants[place.target].ripe = max(self.instants[place.target].ripe, at)
             self.prolonged[number] = at - self._put_at[number] - place.lag
 
     def stop_and_go(self, behaviors: Collection[str] | None, at: Seconds) -> None:
@@ -266,24 +317,27 @@ class RunningNet:
 
     def _is_held(self, place: int) -> bool:
         held = self._held
-        return held is None or any(each.behavior in held for each in self._members[self.net.places[place].target])
+        return held is None or any(
+            each.behavior in held for each in self.instants[self.net.places[place].target].members
+        )
 
     def _set(self, place: int, content: int) -> None:
         self._before.setdefault(place, self._tokens[place])
         self._tokens[place] = content
 
     def _lack_less(self, transition: int) -> None:
-        self._lacking[transition] -= 1
-        if not self._lacking[transition]:
+        self.instants[transition].lacking -= 1
+        if not self.instants[transition].lacking:
             for tell in self._told.opened:
                 tell(transition)
 
     def _miss_less(self, transition: int, at: Seconds) -> None:
         """Note that something has come to `transition`; fire it, and all that follows, if that was the last."""
-        self._since[transition] = max(self._since[transition], at)
-        self._missing[transition] -= 1
-        if not self._missing[transition] and transition not in self.instants:
-            self._fire(transition, self._since[transition])
+        instant = self.instants[transition]
+        instant.since = max(instant.since, at)
+        instant.missing -= 1
+        if not instant.missing and transition not in self.fired:
+            self._fire(transition, instant.since)
 
     def _fire(self, transition: int, at: Seconds) -> None:
         self._firing.append((transition, at))
@@ -293,10 +347,10 @@ class RunningNet:
             self._firing.clear()
 
     def _fire_one(self, transition: int, at: Seconds) -> None:
-        self.instants[transition] = at
+        self.fired[transition] = at
         for number in self.net.inputs[transition]:
             place = self.net.places[number]
-            if place.kind != "phase" and (place.source not in self.instants or place.kind != "idle"):
+            if place.kind != "phase" and (place.source not in self.fired or place.kind != "idle"):
                 self._set(number, EMPTY)
         for tell in self._told.fired:
             tell(transition, at)
@@ -304,14 +358,14 @@ class RunningNet:
             place = self.net.places[number]
             if place.kind != "phase" and not place.after:
                 self._put(number, at)
-        if self._before_end[transition]:
+        if self.instants[transition].is_before_end:
             self._miss_less(self.end, at)
 
     def _put(self, number: int, at: Seconds) -> None:
         """Put a token into a place, at the time of the transition before it, or of a behavior that passes that."""
         place = self.net.places[number]
         target = place.target
-        if target in self.instants and place.kind != "idle":
+        if target in self.fired and place.kind != "idle":
             return  # Only where the target does not wait for it.
         if place.kind == "idle" and self._tokens[number]:
             return  # An event that is decided before all of its first instant are there.
@@ -320,7 +374,7 @@ class RunningNet:
         if place.kind in ("handover", "idle") or target == self.end:
             return
         if place.source or place.lag > 0.0 or place.after:
-            self._ripe[target] = max(self._ripe[target], at + place.lag)
+            self.instants[target].ripe = max(self.instants[target].ripe, at + place.lag)
         if place.lag > 0.0:
             self._put_at[number] = at
             self._clocks.set(number, at + place.lag, at, is_stopped=self._is_held(number))
@@ -340,7 +394,7 @@ class RunningNet:
         blocks' behaviors that were to take a part.
         """
         for number, place in enumerate(self.net.places):
-            if self._tokens[number] and place.kind != "idle" and place.target not in self.instants:
+            if self._tokens[number] and place.kind != "idle" and place.target not in self.fired:
                 self._set(number, EMPTY)
         left = [each for each, place in enumerate(self.net.places) if place.kind == "idle" and not self._tokens[each]]
         outlasting = {self.net.places[each].behavior for each in left}

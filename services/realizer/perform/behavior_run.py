@@ -1,33 +1,45 @@
-"""One behavior of a live block: an asyncio task that awaits its sync points, and talks to what performs it.
+"""One behavior of a live block: an asyncio task from its start to its end, and what it says to who performs it.
 
-The running net resolves a future for each sync point and each instant that is awaited (`SyncPointFutures`).
+The task awaits a future for all that may take time (`SyncPointFutures`): that the behavior may begin, that others are
+where it needs them, that it has ended. What the net decides and what the body reports takes no time: it goes from
+the report to the net, and from the net to the body, in one call. Were a task woken in between, all that is ready on
+the loop would run first, and a word that waits for a stroke would wait for that, too (decision 0159).
 
 The body may end it early: handed over, with all that matters done, or lost. When the block ends first, the body is
 told to stop what still runs, and is given time to do so (`all_ended`).
 """
 
 import asyncio
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping
 from typing import NamedTuple, TypeVar
 
 from msgspec.structs import replace
 
+from engage_hri.schemas import keys
+from engage_hri.schemas.behavior_types import TYPES
 from engage_hri.schemas.behaviors import BlockBehavior, Event, TurnSignal, Wait
 from engage_hri.schemas.blocks import WarningKind
-from engage_hri.schemas.body import BehaviorOutcome, SyncPointArrived, SyncPointReached
+from engage_hri.schemas.body import (
+    BehaviorOutcome,
+    GoHome,
+    PerformBehavior,
+    PlannedInstant,
+    SyncPointArrived,
+    SyncPointReached,
+)
 from engage_hri.schemas.faults import EngageError, Fault
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.decide.decisions import Begin, Decisions, Extend
 from engage_hri.services.realizer.net.running import Observer, RunningNet
-from engage_hri.services.realizer.perform.links import ControlLink, RecognitionLink
+from engage_hri.services.realizer.perform.recognition_link import RecognitionLink
 from engage_hri.services.realizer.plan.phases import with_planned_hand
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.words import AS_IN_DRAFTS, Spelling
-from engage_hri.services.realizer.points import EPSILON, FINISH, Point, performer
-from engage_hri.services.realizer.report.outcome import Spoken
+from engage_hri.services.realizer.points import EPSILON, FINISH, Point
+from engage_hri.services.realizer.report import Spoken
 from engage_hri.services.realizer.together.live import Ending
-from engage_hri.services.requests.ends import NeverEnded, Pending, RequestRefused, unfinished
+from engage_hri.services.requests.ends import NeverEnded, Pending, Requester, RequestRefused, unfinished
 
 T = TypeVar("T")
 
@@ -48,13 +60,12 @@ class SyncPointFutures(Observer):
         self._granted: dict[Point, asyncio.Future[None]] = {}
         self._fired: dict[Point, asyncio.Future[Seconds]] = {}
         self._reached: dict[Point, asyncio.Future[Seconds]] = {}
-        self._reported: dict[Point, asyncio.Future[PointPassed | None]] = {}
 
     def adopt(self, net: RunningNet) -> "SyncPointFutures":
         """Observe another net of the same block from now on."""
         self._net = net
-        for transition in net.instants if self._fired else ():
-            self.on_fired(transition, net.instants[transition])
+        for transition in net.fired if self._fired else ():
+            self.on_fired(transition, net.fired[transition])
         return self
 
     def granted(self, point: Point) -> "asyncio.Future[None]":
@@ -65,8 +76,8 @@ class SyncPointFutures(Observer):
         """Resolved when the transition of `point` fires, with the time. `FINISH`: when the block is over."""
         future = _future(self._fired, point)
         transition = self._net.end if point == FINISH else self._net.at[point]
-        if transition in self._net.instants:
-            _resolve(self._fired, point, self._net.instants[transition])
+        if transition in self._net.fired:
+            _resolve(self._fired, point, self._net.fired[transition])
         return future
 
     def grant(self, point: Point) -> None:
@@ -82,18 +93,9 @@ class SyncPointFutures(Observer):
         """Note that the behavior has passed `point`."""
         _resolve(self._reached, point, at)
 
-    def reported(self, point: Point) -> "asyncio.Future[PointPassed | None]":
-        """Resolved with the report of the body about `point`; with None if it was lost, or there will be none."""
-        return _future(self._reported, point)
-
-    def report(self, point: Point, news: PointPassed | None) -> None:
-        """Note what the body has reported of `point`; what comes after the first is ignored."""
-        if not (future := _future(self._reported, point)).done():
-            future.set_result(news)
-
     def cancel(self) -> None:
         """Cancel all that is still awaited: the block has ended."""
-        for futures in (self._granted, self._fired, self._reached, self._reported):
+        for futures in (self._granted, self._fired, self._reached):
             for future in futures.values():
                 future.cancel()
 
@@ -139,36 +141,57 @@ def loss(outcome: BehaviorOutcome, spelling: Spelling = AS_IN_DRAFTS) -> Fault:
     return outcome.fault or Fault(reason=f"the body {outcome.status} it")
 
 
-class PointHeld(NamedTuple):
-    """A behavior holds at `point`."""
-
-    point: Point
-    at: Seconds
+LONGEST_WAY: Seconds = 10.0
+"""Most seconds on the way home; a body that does not say that it is there is not asked for longer."""
 
 
-class BehaviorLost(NamedTuple):
-    """A behavior cannot be finished. at_rest: its parts rest."""
+class ControlLink(NamedTuple):
+    """Sends the body what one block asks of it.
 
-    behavior: str
-    fault: Fault
-    kind: WarningKind = "EXECUTION_FAILURE"
-    at_rest: bool = False
+    request: the id of the block's request; that of a behavior is `<request>/<behavior>`, with `%2F` for a slash in
+    the behavior's, so that no two are alike. Ids of behaviors hold no colon. held_after: see `RealizerConfig`.
+    """
 
+    bus: Bus
+    requests: Requester
+    request: str
+    block: str
+    held_after: Seconds
 
-class BodyLost(NamedTuple):
-    """The end of what performs the block."""
+    def id(self, behavior: str) -> str:
+        """Id of the request for a behavior, to whatever service performs it."""
+        quoted = behavior.replace("%", "%25").replace("/", "%2F")
+        return f"{self.request}/{quoted}"
 
-    fault: Fault
+    def perform(self, behavior: BlockBehavior, asked: Begin | Extend) -> Pending:
+        """Ask the body to begin a behavior, or to go on as far as is asked."""
+        perform = PerformBehavior(
+            id=self.id(behavior.id),
+            block=self.block,
+            behavior=behavior,
+            through=asked.through.partition(":")[0],  # without the number of a repeated stroke
+            pace=tuple(PlannedInstant(sync=sync, at=self.bus.stamp(at)) for sync, at in asked.pace),
+            held=isinstance(asked, Extend) and asked.held,
+            held_after=self.held_after,
+        )
+        return self.requests.send(keys.BEHAVIOR, perform)
 
+    def cancel(self, behavior: str, why: Fault | str) -> None:
+        """Cancel the request for a behavior, to whatever service performs it. why: what has happened."""
+        self.requests.cancel(self.id(behavior), why)
 
-RunNews = PointHeld | PointPassed | BehaviorLost | BodyLost
-"""What becomes of a behavior, as its run tells it."""
+    def go_home(self, parts: Iterable[str], behavior: str = "") -> None:
+        """Send these parts home. behavior: the one that used them; empty: the whole block."""
+        going = GoHome(id=f"{self.id(behavior)}:home", parts=tuple(sorted(parts)))
+        self.requests.send(keys.BEHAVIOR, going, within=LONGEST_WAY)
 
 
 class Stage(NamedTuple):
     """Values that the runs of one block share.
 
-    id, plan: of the block, as it began. tell: takes what becomes of a behavior.
+    id, plan: of the block, as it began. arrive, reach: take that a behavior holds at a point, and has passed one.
+    lose: takes that a behavior cannot be finished, and whether its parts rest. lose_body: that nothing of the block
+    is performed any more.
     """
 
     id: str
@@ -179,7 +202,10 @@ class Stage(NamedTuple):
     recognition: RecognitionLink
     futures: SyncPointFutures
     spoken: Spoken
-    tell: Callable[[RunNews], None]
+    arrive: Callable[[Point, Seconds], None]
+    reach: Callable[[PointPassed], None]
+    lose: Callable[[str, Fault, WarningKind, bool], None]
+    lose_body: Callable[[Fault], None]
 
 
 class BehaviorRun:
@@ -189,101 +215,86 @@ class BehaviorRun:
     pending: the request to what performs it.
     """
 
-    __slots__ = ("_asked", "_block", "_hold_changed", "_points", "behavior", "id", "pending")
+    __slots__ = ("_asked", "_block", "_hold_changed", "_performer", "behavior", "id", "pending")
 
     def __init__(self, block: Stage, id: str) -> None:
         self.id = id
         self.behavior: BlockBehavior | None = None
         self.pending: Pending | None = None
         self._block = block
+        self._performer = TYPES[block.plan.chains[id].type].performer
         self._asked: Begin | Extend | None = None
         self._hold_changed: asyncio.Future[None] | None = None
-        self._points: Sequence[Point] = ()
 
     @property
     def is_by_body(self) -> bool:
         """True if the body performs it: it has begun."""
-        return self.behavior is not None and performer(self.behavior) == "body"
+        return self.behavior is not None and self._performer == "body"
 
     def command(self, asked: Begin | Extend) -> None:
-        """Let it begin, or go on as far as is asked."""
-        self._asked = asked
-        if asked.through == "end" and performer(self._block.plan.chains[self.id].behavior) == "clock":
-            self._block.futures.grant(Point(self.id, "end"))
+        """Let it begin, or go on as far as is asked. The body hears of it at once."""
+        block, self._asked = self._block, asked
         if isinstance(asked, Begin):
-            self._block.futures.grant(Point(self.id, "start"))
+            self.behavior = with_planned_hand(block.decisions.plan.chains[self.id])
+            if self.is_by_body:
+                self._send()
+            block.futures.grant(Point(self.id, "start"))
         elif self._hold_changed is not None and not self._hold_changed.done():
             self._hold_changed.set_result(None)
-        elif self.is_by_body and self.pending is not None:
+        elif self.is_by_body:
             self._send()
+        if asked.through == "end" and self._performer == "clock":
+            block.futures.grant(Point(self.id, "end"))
 
     def feed(self, message: SyncPointArrived | SyncPointReached) -> None:
-        """Take a report of the body: it resolves the future of its sync point, which the behavior awaits."""
+        """Take a report of the body. Points before it that nobody has reported are passed, too."""
         block, point = self._block, Point(self.id, message.sync)
         if self.pending is None or self.pending.request.id != message.id or self.pending.outcome.done():
             return
         facts, bus = block.decisions.facts, block.bus
         at = facts.plausible(point, bus.local(message.at), bus.now())
         if isinstance(message, SyncPointArrived):
-            block.tell(PointHeld(point, at))
-        elif point in self._points:
+            block.arrive(point, at)
+        else:
             same = message.arrived == message.at
             arrived = at if same else facts.plausible(point, bus.local(message.arrived), at)
-            self._report(point, PointPassed(point, at, arrived, by_body=True))
-
-    def _report(self, point: Point, news: PointPassed | None) -> None:
-        """Resolve the future of a sync point. Earlier ones that nobody has reported are made good by this one."""
-        for each in self._points[: self._points.index(point) + 1]:
-            self._block.futures.report(each, news if each == point else None)
+            block.reach(PointPassed(point, at, arrived, by_body=True))
 
     async def perform(self) -> None:
         """Wait until it may begin, and perform it to its end."""
         block = self._block
         await block.futures.granted(Point(self.id, "start"))
-        if (chain := block.decisions.plan.chains.get(self.id)) is None:
-            return  # It was lost before its turn on the loop came.
-        behavior = self.behavior = with_planned_hand(chain)
-        match behavior:
-            case Wait(duration=duration):
-                await self._wait(duration or 0.0)
-            case Event():
-                await self._event(behavior)
-            case TurnSignal():
-                block.recognition.signal(block.body.id(self.id), block.id, behavior)
-                self._at_once()
-            case _ if performer(behavior) == "clock":
-                await self._wait(0.0)
-            case _:
-                await self._by_body(behavior, chain.points)
+        if self.pending is not None:
+            await self._by_body(self.pending)
+        elif self.id in block.decisions.plan.chains:  # Else it was lost before its turn on the loop came.
+            match self.behavior:
+                case Wait(duration=duration):
+                    await self._wait(duration or 0.0)
+                case Event() as event:
+                    await self._event(event)
+                case TurnSignal() as signal:
+                    block.recognition.signal(block.body.id(self.id), block.id, signal)
+                    self._at_once()
+                case _:
+                    await self._wait(0.0)
 
-    def _send(self) -> Pending:
+    def _send(self) -> None:
         assert self.behavior is not None
         assert self._asked is not None
         self.pending = self._block.body.perform(self.behavior, self._asked)
-        return self.pending
 
-    async def _by_body(self, behavior: BlockBehavior, points: Sequence[Point]) -> None:
-        """Follow the body through the sync points of the behavior.
-
-        A report of the body resolves the future of a point: the behavior tells it, and the net fires. What the net
-        grants then is sent at once (`command`), whichever point the behavior awaits.
-        """
+    async def _by_body(self, sent: Pending) -> None:
+        """Follow the body to the end of the behavior. Sync points on the way are taken as they are told (`feed`)."""
         block = self._block
-        block.decisions.count_from(self.id, block.bus.now())
-        ended, self._points = self._send().outcome, points
-        ended.add_done_callback(lambda _: self._report(points[-1], None))
-        for point in points:
-            if (reached := await block.futures.reported(point)) is not None:
-                block.tell(reached)
         try:
-            outcome = await ended
+            outcome = await sent.outcome
         except (RequestRefused, NeverEnded) as error:
             refused = isinstance(error, RequestRefused)
             self.lose(error.fault, "CANNOT_CREATE_BEHAVIOR" if refused else "EXECUTION_FAILURE")
             return
         except EngageError as error:
             self.pending = None
-            block.tell(BodyLost(error.fault.at(block.id)))
+            block.lose_body(error.fault.at(block.id))
             return
         if not isinstance(outcome, BehaviorOutcome):
             self.lose(Fault(reason=f"control ended it with a {type(outcome).__name__}"))
@@ -291,14 +302,14 @@ class BehaviorRun:
         block.spoken.end(outcome)
         if outcome.status == "lapsed":  # the body has gone home: nothing of this block can be as planned
             unsaid = Fault(reason="nobody has renewed it", where=block.plan.block.id, cause="unrenewed")
-            block.tell(BodyLost(outcome.fault or unsaid))
+            block.lose_body(outcome.fault or unsaid)
             return
-        facts, end = block.decisions.facts, points[-1]
+        facts, end = block.decisions.facts, block.plan.chains[self.id].points[-1]
         at = facts.plausible(end, block.bus.local(outcome.at), block.bus.now())
         if outcome.status == "taken_over":  # its last report may be lost
-            block.tell(PointPassed(Point(self.id, outcome.passed), at, by_body=True))
+            block.reach(PointPassed(Point(self.id, outcome.passed), at, by_body=True))
         if has_lost_nothing(block.decisions.plan, outcome, facts.reached):
-            block.tell(PointPassed(end, at, by_body=outcome.status == "done"))
+            block.reach(PointPassed(end, at, by_body=outcome.status == "done"))
         else:
             self.lose(loss(outcome, Spelling(block.plan.block)), at_rest=outcome.status != "failed")
 
@@ -306,23 +317,23 @@ class BehaviorRun:
         """Give it up: it cannot be finished. The fault gets the line of the behavior."""
         assert self.behavior is not None
         fault = replace(fault, line=fault.line or self.behavior.line)
-        self._block.tell(BehaviorLost(self.id, fault, kind, at_rest))
+        self._block.lose(self.id, fault, kind, at_rest)
 
     def _at_once(self) -> None:
         now = self._block.bus.now()
-        self._block.tell(PointPassed(Point(self.id, "start"), now))
-        self._block.tell(PointPassed(Point(self.id, "end"), now))
+        self._block.reach(PointPassed(Point(self.id, "start"), now))
+        self._block.reach(PointPassed(Point(self.id, "end"), now))
 
     async def _wait(self, duration: Seconds) -> None:
         block, end = self._block, Point(self.id, "end")
         began = block.bus.now()
-        block.tell(PointPassed(Point(self.id, "start"), began))
+        block.reach(PointPassed(Point(self.id, "start"), began))
         if duration:
             await self._time(began, duration)
         arrived = block.bus.now()
-        block.tell(PointHeld(end, arrived))
+        block.arrive(end, arrived)
         await block.futures.granted(end)
-        block.tell(PointPassed(end, block.bus.now(), arrived))
+        block.reach(PointPassed(end, block.bus.now(), arrived))
 
     async def _time(self, began: Seconds, duration: Seconds) -> None:
         """Wait for so long, not counting the time in which the behavior is held."""
@@ -354,7 +365,7 @@ class BehaviorRun:
     async def _event(self, event: Event) -> None:
         block = self._block
         began = await self._really_begun(event)
-        block.tell(PointPassed(Point(event.id, "start"), began))
+        block.reach(PointPassed(Point(event.id, "start"), began))
         pending = block.recognition.ask(block.body.id(event.id), block.id, event, began)
         if pending is not None:
             self.pending = pending
@@ -365,7 +376,7 @@ class BehaviorRun:
             self.lose(error.fault, "CANNOT_CREATE_BEHAVIOR")
         else:
             end = Point(event.id, "end")
-            block.tell(PointPassed(end, max(began, decision.at), by_body=decision.by_recognition))
+            block.reach(PointPassed(end, max(began, decision.at), by_body=decision.by_recognition))
 
 
 ABORT: Seconds = 5.0

@@ -19,7 +19,7 @@ from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.together.live import Live
-from engage_hri.services.runtime.alarm import Timer
+from engage_hri.services.runtime.loop import Timer
 
 EVERY: Seconds = 0.05
 """Least time between two messages about what has changed: nobody sees more of it."""
@@ -89,7 +89,7 @@ class NetStream(Observer):
         self._is_untold = False
         self._net.changes()
         self._fired.clear()
-        fired = {each: at - self._began for each, at in self._net.instants.items()}
+        fired = {each: at - self._began for each, at in self._net.fired.items()}
         message = described(self._plan, self._bus.stamp(self._began), self._net.marking, fired, self._spelling)
         self._bus.publish(keys.NET, replace(message, block=self._block, follows=self._follows))
         self._again.set(self._bus.now() + AGAIN)

@@ -22,32 +22,28 @@ from engage_hri.services.realizer.decide.decisions import Begin, Decisions, Effe
 from engage_hri.services.realizer.decide.lateness import Late, Stalled
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.perform.behavior_run import (
-    BehaviorLost,
     BehaviorRun,
-    BodyLost,
-    PointHeld,
+    ControlLink,
     PointPassed,
-    RunNews,
     Stage,
     SyncPointFutures,
     all_ended,
 )
-from engage_hri.services.realizer.perform.links import ControlLink, Presence, RecognitionLink
 from engage_hri.services.realizer.perform.net_stream import NetStream
+from engage_hri.services.realizer.perform.recognition_link import Presence, RecognitionLink
 from engage_hri.services.realizer.plan.known import Known, is_named_in
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import planned_again, reestimated
 from engage_hri.services.realizer.plan.remaining import events_needing, without
 from engage_hri.services.realizer.plan.words import Spelling
 from engage_hri.services.realizer.points import FINISH, Point, frozen
-from engage_hri.services.realizer.report.feedback import News, Reporter
-from engage_hri.services.realizer.report.outcome import Spoken, completed, reasons
+from engage_hri.services.realizer.report import News, Reporter, Spoken, completed, reasons
 from engage_hri.services.realizer.together.live import Ending, Live
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks, Neighbor
-from engage_hri.services.realizer.together.rehearsal import Ask, Rehearsing, is_crowd, parts_moved
+from engage_hri.services.realizer.together.planning import Ask, Rehearsing, is_crowd, parts_moved
 from engage_hri.services.realizer.together.ties import Ties
 from engage_hri.services.requests.ends import Requester
-from engage_hri.services.runtime.alarm import Afterwards, Alarm, Timer
+from engage_hri.services.runtime.loop import Afterwards, Alarm, Timer
 
 
 class SharedContext(Struct, frozen=True):
@@ -105,7 +101,7 @@ class BlockPerformance(Neighbor):
         self._net = NetStream(shared.bus, live.id, spelling, live.request.follows)
         self.report = Reporter(shared.bus, live.id, spelling)
         self.spoken = Spoken(plan.block.behaviors)
-        self.body = ControlLink(shared.bus, shared.requests, live.request.id, live.id, shared.config)
+        self.body = ControlLink(shared.bus, shared.requests, live.request.id, live.id, shared.config.held_after)
         self.decisions = Decisions(
             plan, self.bus.now(), shared.config, self._observers, self._is_free, self.bus.sight, self._ending.done
         )
@@ -113,8 +109,9 @@ class BlockPerformance(Neighbor):
             shared.bus, shared.requests, shared.peers, lambda: (each.last_deed for each in shared.others())
         )
         stage = Stage(
-            live.id, plan, self.decisions, self.bus, self.body, recognition, self.futures, self.spoken, self._take
-        )
+            live.id, plan, self.decisions, self.bus, self.body, recognition, self.futures, self.spoken,
+            self._arrive, self._reach, self.lose, self._lose_body,
+        )  # fmt: skip
         self._runs = {id: BehaviorRun(stage, id) for id in plan.chains}
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._dropped = reasons(plan)
@@ -131,7 +128,13 @@ class BlockPerformance(Neighbor):
         self._afterwards = Afterwards(self.take_in)
         self._soon = Alarm(self.take_in)
         self.rehearsing = Rehearsing(
-            self.decisions, shared.performed, self._known, self.bus.now, shared.ask, self._plan_with, self.containing
+            self.decisions,
+            shared.performed,
+            self._known,
+            self.bus.now,
+            shared.ask,
+            lambda estimates: self.take_in(partial(self._go_on_with_estimates, estimates)),
+            self.containing,
         )
         self._untold: list[News] = []
         self._needs_replan = False
@@ -307,10 +310,6 @@ class BlockPerformance(Neighbor):
 
     # -- holds -------------------------------------------------------------------------------------------------------
 
-    def can_wait(self, behavior: str) -> bool:
-        """True if the behavior, which is going on, can still be made to wait somewhere."""
-        return self.decisions.can_wait(behavior)
-
     def hold_up(self, is_held: bool) -> None:
         """Note that something is held from now on, perhaps of another block, or nothing any more."""
         if is_held != self._is_held:
@@ -395,7 +394,7 @@ class BlockPerformance(Neighbor):
             made_news = [self.apply(effect) for effect in self.decisions.advance(self.bus.now())]
             again = any(made_news)
         foresight = self.decisions.foresight
-        if foresight.is_surprised and self.report.may_expect() and not self._ending.done():
+        if foresight.is_surprised and self.bus.now() >= self.report.not_before and not self._ending.done():
             self.report.expect(self.decisions.plan, self.decisions.began, foresight.expected(self.bus.now()))
         self._shared.live_blocks.foresee(self.plan.block.id, foresight.ahead)
         self.tell_stuck()
@@ -432,6 +431,7 @@ class BlockPerformance(Neighbor):
         """Tell what was reached, in feedback and to other blocks."""
         while self._untold:  # one by one: others may have it planned again when they hear, and that tells the rest
             point, at, arrived, by_body = self._untold.pop(0)
+            self.spoken.reach(point)
             came = self.decisions.facts.arrived.get(point, arrived)
             self.report.reached(self.decisions, point, arrived=came, by_body=by_body)
             self._shared.live_blocks.reach(self.plan.block.id, point, at)
@@ -444,25 +444,16 @@ class BlockPerformance(Neighbor):
 
     # -- what behaviors tell -----------------------------------------------------------------------------------------
 
-    def _take(self, news: RunNews) -> None:
-        match news:
-            case PointHeld(point, at):
-                if not self._ending.done():
-                    self.decisions.arrive(point, at)
-                    self._hurry()
-            case PointPassed():
-                self._reach(news)
-            case BehaviorLost(behavior, fault, kind, at_rest):
-                self.lose(behavior, fault, kind, at_rest=at_rest)
-            case BodyLost(fault):
-                self._lose_body(fault)
+    def _arrive(self, point: Point, at: Seconds) -> None:
+        if not self._ending.done():
+            self.decisions.arrive(point, at)
+            self._hurry()
 
     def _reach(self, told: PointPassed) -> None:
         point, at = told.point, told.at
         if news := self.decisions.reach(point, at):
             self._untold += [News(each, at, told.arrived if each == point else None, told.by_body) for each in news]
             for each in news:
-                self.spoken.reach(each)
                 self.futures.reach(each, at)
             self._hurry()
 
@@ -473,7 +464,7 @@ class BlockPerformance(Neighbor):
                 self.apply(effect)
         self._afterwards.set()
 
-    def lose(self, id: str, fault: Fault, kind: WarningKind = "EXECUTION_FAILURE", *, at_rest: bool = False) -> None:
+    def lose(self, id: str, fault: Fault, kind: WarningKind = "EXECUTION_FAILURE", at_rest: bool = False) -> None:
         """Drop a behavior that cannot be finished; if it is required, the block fails. at_rest: its parts rest."""
         if id in self._dropped or self._ending.done():
             return
@@ -518,9 +509,6 @@ class BlockPerformance(Neighbor):
             self._go_on_with(planned_again(self.decisions.plan, self._known(), self._gone))
         except InputRefused as error:
             self._live.fail(error.fault)
-
-    def _plan_with(self, estimates: Iterable[Estimate]) -> None:
-        self.take_in(partial(self._go_on_with_estimates, estimates))
 
     def _go_on_with_estimates(self, estimates: Iterable[Estimate]) -> None:
         """Go on with other estimates, if that costs nothing."""

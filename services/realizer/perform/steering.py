@@ -14,11 +14,11 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.perform.performance import BlockPerformance
 from engage_hri.services.realizer.points import EPSILON, frozen
-from engage_hri.services.realizer.report.feedback import ON_REQUEST
+from engage_hri.services.realizer.report import ON_REQUEST
 from engage_hri.services.realizer.together.live import Ending, Live, absence
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks
 from engage_hri.services.requests.ends import RequestDesk
-from engage_hri.services.runtime.alarm import Timer
+from engage_hri.services.runtime.loop import Timer
 
 Named = tuple[str, str]
 """A block and a behavior of it. An empty behavior: the whole block; an empty block: the robot."""
@@ -136,7 +136,7 @@ class Steering:
     def _can_wait(self, live: Live, behavior: str) -> bool:
         """True if the behavior can still be made to wait."""
         performance = self._performances.get(live.request.id)
-        return self.is_going_on(live, behavior) and (performance is None or performance.can_wait(behavior))
+        return self.is_going_on(live, behavior) and (performance is None or performance.decisions.can_wait(behavior))
 
     async def interrupt(self, live: Live, behavior: str, reason: str = "") -> bool:
         """End a behavior that is going on, or take it out if its block has yet to begin.

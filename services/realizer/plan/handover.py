@@ -13,7 +13,7 @@ from engage_hri.schemas.behaviors import Gesture, Hand, Pointing
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.net.clocks import NO_STOPS, Stops
+from engage_hri.services.realizer.net.facts import NO_STOPS, Stops
 from engage_hri.services.realizer.plan.phases import ARMS, Chain
 from engage_hri.services.realizer.plan.relations import Classes, Relations
 from engage_hri.services.realizer.plan.schedule import Circle

@@ -186,10 +186,12 @@ def _clash(earlier: Chain, sync: str, later: Chain, classes: Classes) -> bool:
     last = next(number for number, point in enumerate(earlier.points) if point.sync == sync)
     since_start = list(accumulate((each.shortest for each in later.segments), initial=0.0))
     left = list(accumulate((each.shortest for each in reversed(earlier.segments[:last])), initial=0.0))[::-1]
+    ends = [(*classes.place(point), still) for point, still in zip(earlier.points, left, strict=False)]
+    starts = [(*classes.place(point), gone) for point, gone in zip(later.points, since_start, strict=True)]
     return any(
-        (apart := classes.offset_between(one, other)) is not None and apart < still + gone - EPSILON
-        for one, still in zip(earlier.points, left, strict=False)
-        for other, gone in zip(later.points, since_start, strict=True)
+        tied_to == other and end - start < still + gone - EPSILON
+        for tied_to, start, still in ends
+        for other, end, gone in starts
     )
 
 

@@ -18,9 +18,8 @@ A user that fits nowhere all the same is lost: the schedule tells why. The work 
 one schedule, and the next only when a behavior or a tie is gone, or when another behavior was in the way.
 """
 
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from itertools import accumulate, pairwise
-from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -71,13 +70,15 @@ class PartOrder:
 
     def __init__(self, given: frozenset[Turn] = frozenset()) -> None:
         self.given = given
-        self._rivals = set[str]()
+        self._rivals = frozenset[str]()
         """Behaviors that have been in the way of others, or had others in their way."""
         self.begin_anew()
 
     def begin_anew(self) -> None:
         """Begin again without changes: the speeches have another order, or something is gone."""
         self._changed = frozenset[Turn]()
+        self._ordered = frozenset[str]()
+        """The rivals when they were last ordered."""
         self._untouched: Untouched | None = None
 
     @property
@@ -112,10 +113,11 @@ class PartOrder:
 
     def _order(self, chains: Mapping[str, Chain]) -> bool:
         """Order those that have been in the way; False if that gives no new order."""
-        users = [chains[id] for id in chains if id in self._rivals]
-        before = self._changed
-        if self._untouched is not None and users:
-            self._changed = _turns(users, self._untouched)
+        rivals = self._rivals & chains.keys()
+        if self._untouched is None or self._ordered == rivals:
+            return False
+        before, self._ordered = self._changed, rivals
+        self._changed = _turns([chains[id] for id in chains if id in rivals], self._untouched)
         return self._changed != before
 
 
@@ -140,7 +142,7 @@ class SpeakingOrder:
         is_changed = self.current != self._document
         self._document = tuple([id for id in self._document if id in left])
         self.current = () if is_changed and is_retimed else tuple([id for id in self.current if id in left])
-        self._is_last = len(self._document) < 2
+        self._is_last = len(self._document) < 2 or (self._is_last and not is_retimed)
 
     def refute(self, circles: Iterable[Circle]) -> bool:
         """Plan without an order if these circles come of it; False if none does, or if it was the last one.
@@ -158,12 +160,8 @@ class SpeakingOrder:
         if self._is_last or self.current:
             return False
         speeches = [chains[id] for id in self._document]
-        found = _orders(speeches, seen, lambda later, earlier: is_tied(later, earlier, classes))
-        order = list(dict.fromkeys(chain.behavior.id for each in found for chain in each))
-        for number, id in enumerate(self._document):
-            if id not in order:  # It fits nowhere: it is said in its place in the document, which is impossible.
-                order.insert(order.index(self._document[number - 1]) + 1 if number else 0, id)
-        self.current = tuple(order)
+        found = _orders(speeches, seen, classes)
+        self.current = tuple(dict.fromkeys(chain.behavior.id for order in found for chain in order))
         self._is_last = True
         return True
 
@@ -180,17 +178,15 @@ def _turns(users: Iterable[Chain], untouched: Untouched) -> frozenset[Turn]:
     return frozenset((later.behavior.id, one.points[untouched.left(one)]) for one, later in pairs)
 
 
-def _orders(
-    users: Sequence[Chain],
-    untouched: Untouched,
-    is_free: Callable[[Chain, Chain], bool] = lambda later, earlier: False,
-) -> list[list[Chain]]:
-    """For each part, its users in order, without those that fit nowhere.
+def _orders(users: Sequence[Chain], untouched: Untouched, classes: Classes | None = None) -> list[list[Chain]]:
+    """For each part, its users in order.
 
-    users: in the order in which they are placed. is_free: true if the ties say themselves how the first follows the
-    second, so that it waits for nothing else.
+    One that fits nowhere comes behind the one that it is placed after; if it is required, it is left out.
+
+    users: in the order in which they are placed. classes: of points, if they are speeches: one that is
+    tied to the words of another waits for nothing else.
     """
-    room = _room(users, untouched, is_free)
+    room = _room(users, untouched, classes)
     # A shift takes nothing from a look, nor a look from a shift: see `handover.in_series`.
     groups = [
         [number for number, chain in enumerate(users) if part in chain.parts and (chain.type in SHIFTS) == is_shift]
@@ -204,6 +200,11 @@ def _orders(
         placed = _placed(group, [], room, tries, may_skip=False) or _placed(group, [], room, tries, may_skip=True)
         assert placed is not None
         order, room = placed
+        for before, number in pairwise([-1, *group]):
+            # What fits nowhere is to be lost, but for what is required: who is in its way is.
+            is_kept = users[number].behavior.id in untouched.present.required and users[number].type != "speech"
+            if number not in order and not is_kept:
+                order.insert(order.index(before) + 1 if before in order else 0, number)
         found.append([users[number] for number in order])
     return found
 
@@ -263,16 +264,16 @@ class _Room:
                 room = room.with_wait(earlier, later) or room
 
 
-def _room(users: Sequence[Chain], untouched: Untouched, is_free: Callable[[Chain, Chain], bool]) -> _Room:
+def _room(users: Sequence[Chain], untouched: Untouched, classes: Classes | None) -> _Room:
     at, times = untouched.assembly.at, np.array(untouched.times)
     spare = spare_times(untouched.ties, untouched.times)
-    clock = distances(0, spare)
+    clock = np.array(distances(0, spare))
     spare[0] = []  # From each start, the way through the start of the block is known then.
+    starts = [at[chain.points[0]] for chain in users]
     ends = [at[chain.points[untouched.left(chain)]] for chain in users]
-    apart = []
-    for start in (at[chain.points[0]] for chain in users):
-        found = distances(start, spare)
-        back = found.get(0, inf)
-        least_spare = [min(found.get(end, inf), back + clock.get(end, inf)) for end in ends]
-        apart.append(times[ends] - times[start] - least_spare)
-    return _Room(np.array(apart), np.array([[is_free(later, earlier) for earlier in users] for later in users]))
+    found = np.array([distances(start, spare) for start in starts])
+    least_spare = np.minimum(found[:, ends], found[:, :1] + clock[ends])
+    is_free = np.zeros((len(users), len(users)), np.bool_)
+    if classes is not None:
+        is_free[:] = [[is_tied(later, earlier, classes) for earlier in users] for later in users]
+    return _Room(times[ends] - times[starts, None] - least_spare, is_free)

@@ -17,7 +17,7 @@ from engage_hri.schemas.behaviors import BlockBehavior, Event, Gesture, Hand, He
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.realizer.net.clocks import Stops
+from engage_hri.services.realizer.net.facts import Stops
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
 from engage_hri.services.realizer.plan.relations import Relations
 from engage_hri.services.realizer.points import ON_TARGET, ORIGIN, Member, Point, Segment, family, frozen, segments

@@ -14,9 +14,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import Hand
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
-from engage_hri.services.realizer.plan import other_blocks
 from engage_hri.services.realizer.plan.assembly import Assembler, Assembly
-from engage_hri.services.realizer.plan.draft import Draft
 from engage_hri.services.realizer.plan.handover import (
     Arrangement,
     Hands,
@@ -25,14 +23,23 @@ from engage_hri.services.realizer.plan.handover import (
     kept_points,
     with_hands,
 )
-from engage_hri.services.realizer.plan.known import NOTHING, Known, is_foreign
+from engage_hri.services.realizer.plan.known import (
+    NOTHING,
+    Known,
+    awaited,
+    foreseen,
+    is_foreign,
+    naming_others,
+    needless_turns,
+    share,
+    without_date,
+)
 from engage_hri.services.realizer.plan.losses import clashes
-from engage_hri.services.realizer.plan.other_blocks import naming_others, needless_turns, share
 from engage_hri.services.realizer.plan.part_order import Untouched
-from engage_hri.services.realizer.plan.phases import ARMS, as_run, natural_ends, unawaited_events
+from engage_hri.services.realizer.plan.phases import ARMS, as_run, natural_ends
 from engage_hri.services.realizer.plan.plan import AT_EASE, Manner, Plan, compared, eased, standing
 from engage_hri.services.realizer.plan.relations import BlockRefused, Classes, Equal, Term
-from engage_hri.services.realizer.plan.remaining import remaining
+from engage_hri.services.realizer.plan.remaining import Draft, remaining
 from engage_hri.services.realizer.plan.repairs import Stuck, repaired
 from engage_hri.services.realizer.plan.schedule import Impossible, Solution, critical_path, predict
 from engage_hri.services.realizer.points import frozen
@@ -76,19 +83,17 @@ def _planned(draft: Draft, barred: Container[tuple[str, Hand]]) -> Steps[Plan | 
     one is taken.
     """
     known = draft.known
-    present, classes = draft.begin_anew()
+    present, classes, assembler = draft.begin_anew()
     natural = natural_ends(draft.chains, present)
-    waited_for = frozenset(draft.chains) - unawaited_events(draft.chains, present)
     draft.turns = frozen(turn for turn in draft.turns if {turn[0], turn[1].behavior} <= draft.chains.keys())
     first = Arrangement(natural, known.begun, early=frozenset(draft.early), stops=known.stops)
     arrangement = replace(first, turns=draft.turns, spoken=draft.order.current)
-    assembler = Assembler(draft.chains, present, classes, waited_for)
     given = {name: holder.chain for name, holder in known.holders.items()}
     tried: list[Arrangement] = []
     """Arrangements since the last conflict."""
     while True:
         if (named := naming_others(present, arrangement)) != assembler.relations:
-            assembler = Assembler(draft.chains, named, classes, waited_for)
+            assembler = Assembler(draft.chains, named, classes, assembler.waited_for)
         scheduled = yield from _scheduled(draft, assembler, arrangement, classes)
         if scheduled is None:
             return None
@@ -102,7 +107,7 @@ def _planned(draft: Draft, barred: Container[tuple[str, Hand]]) -> Steps[Plan | 
         kept = present.held.union(*(holder.kept for holder in known.holders.values()))
         hands = Hands({**draft.chains, **given}, everywhere, kept, barred)
         arranged, conflicts = arrange(draft.chains, present, arrangement, everywhere, rounds, hands, known.begun)
-        undated = other_blocks.without_date(assembly, known) if given else ()
+        undated = without_date(assembly, known) if given else ()
         arranged, others = share(draft.chains, present, known, arranged, everywhere, hands, assembly, undated)
         settled = draft.overlaps | draft.turns
         conflicts = [each for each in (*conflicts, *others) if each.is_open(known.begun, settled)]
@@ -136,7 +141,7 @@ def _planned(draft: Draft, barred: Container[tuple[str, Hand]]) -> Steps[Plan | 
         estimates=draft.estimates,
         natural=natural,
         required=present.required,
-        waited_for=waited_for,
+        waited_for=assembler.waited_for,
         kept=kept_points(draft.chains, present, arrangement.handovers),
         entering=arranged.ranked,
         turns=draft.turns,
@@ -178,8 +183,8 @@ def _scheduled(
             assembler = Assembler(draft.chains, assembler.relations, classes, assembler.waited_for)
             continue
         assembly = replace(assembly, net=standing(assembly.net, assembly.at, draft.chains, draft.manner.stands))
-        times = other_blocks.foreseen(assembly, draft.known, draft.doubted)
-        behind = tuple(other_blocks.awaited(assembly, draft.known, draft.waived))
+        times = foreseen(assembly, draft.known, draft.doubted)
+        behind = tuple(awaited(assembly, draft.known, draft.waived))
         try:
             solution = predict(assembly.net, assembly.waits, times, behind, draft.manner.may_be_late)
         except Impossible as impossible:

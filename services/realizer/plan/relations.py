@@ -428,6 +428,15 @@ class Classes:
         """Seconds from a point's parent to the point."""
         self._links: dict[Point, list[tuple[Point, Link]]] = defaultdict(list)
 
+    def copy(self) -> "Classes":
+        """The same classes, to be merged further."""
+        other = Classes()
+        other._clock |= self._clock
+        other._parent |= self._parent
+        other._offset |= self._offset
+        other._links |= {point: [*links] for point, links in self._links.items()}
+        return other
+
     def add(self, point: Point) -> None:
         """Take in a point, in a class of its own."""
         if point not in self._parent:
@@ -445,21 +454,23 @@ class Classes:
             self._parent[each], self._offset[each] = point, offset
         return point, offset
 
-    def at(self, point: Point) -> Seconds | None:
-        """Seconds from the block's start at which the point is to happen; None if not given."""
+    def place(self, point: Point) -> tuple[Point, Seconds]:
+        """The start of the block if the point has a time, or else its representative; and the seconds from there."""
         if point == ORIGIN:
-            return 0.0
+            return ORIGIN, 0.0
         root, offset = self.find(point)
         clock = self._clock.get(root)
-        return None if clock is None else clock + offset
+        return (root, offset) if clock is None else (ORIGIN, clock + offset)
+
+    def at(self, point: Point) -> Seconds | None:
+        """Seconds from the block's start at which the point is to happen; None if not given."""
+        tied_to, seconds = self.place(point)
+        return seconds if tied_to == ORIGIN else None
 
     def offset_between(self, one: Point, other: Point) -> Seconds | None:
         """Seconds from `one` to `other`; None if nothing ties them."""
-        (root, start), (other_root, end) = self.find(one), self.find(other)
-        if root == other_root:
-            return end - start
-        since, to = self.at(one), self.at(other)
-        return None if since is None or to is None else to - since
+        (root, start), (other_root, end) = self.place(one), self.place(other)
+        return end - start if root == other_root else None
 
     def tie(self, equal: Equal, block: str) -> None:
         """Merge the classes of these points. Raises BlockRefused, with points and lines, at a contradiction."""

@@ -38,11 +38,11 @@ from typing import Literal, NamedTuple, TypeVar
 
 from engage_hri.services.realizer.net.petri_net import Bound, Place
 from engage_hri.services.realizer.plan.assembly import Assembly
-from engage_hri.services.realizer.plan.draft import Draft
 from engage_hri.services.realizer.plan.handover import Arrangement, Turn, by_ends, turns_in
 from engage_hri.services.realizer.plan.known import is_foreign
 from engage_hri.services.realizer.plan.losses import Loss, judge
 from engage_hri.services.realizer.plan.relations import Classes, Relations
+from engage_hri.services.realizer.plan.remaining import Draft
 from engage_hri.services.realizer.plan.schedule import Awaited, Circle, Foresight
 from engage_hri.services.realizer.plan.words import other_part, taken
 from engage_hri.services.realizer.points import Point
@@ -62,7 +62,7 @@ class Stuck(NamedTuple):
     classes: Classes
 
     def turns_of(self, turns: Iterable[Turn], *circles: Circle) -> list[Turn]:
-        """Those of the turns that the circles go through."""
+        """Find those of the turns that the circles go through."""
         return list(turns_in(by_ends(turns, self.assembly.at), *circles))
 
     def held_up(self) -> Iterable[tuple[Turn, set[Point], bool]]:
@@ -147,12 +147,12 @@ def leave_sooner(draft: Draft, stuck: Stuck) -> Next | None:
 
 
 def waive_waits_of_others(draft: Draft, stuck: Stuck) -> Next | None:
-    """Do not mind that another block waits for this one where this one waits for it, whatever is planned."""
+    """Let another block wait in vain for what waits for it, whatever is planned."""
     return _noted(draft.waived, {tie.pair for tie in stuck.ties if isinstance(tie, Awaited)}, "again")
 
 
 def doubt_others(draft: Draft, stuck: Stuck) -> Next | None:
-    """Do not mind when points of others are expected where that is too late for times that are fixed."""
+    """Forget when points of others are expected where that is too late for times that are fixed."""
     transitions = stuck.assembly.net.transitions
     late = {
         point for tie in stuck.ties if isinstance(tie, Foresight) for point in transitions[tie.target].points

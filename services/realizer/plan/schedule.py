@@ -273,15 +273,16 @@ def spare_times(ties: Iterable[Place | Bound], times: Sequence[Seconds]) -> Spar
     return spare
 
 
-def distances(source: int, out: Sequence[Sequence[tuple[int, Seconds]]]) -> dict[int, Seconds]:
-    """Shortest distances from a node to all that can be reached (Dijkstra)."""
-    found: dict[int, Seconds] = {}
+def distances(source: int, out: Sequence[Sequence[tuple[int, Seconds]]]) -> list[Seconds]:
+    """Shortest distances from a node to all others, inf to those that cannot be reached (Dijkstra)."""
+    found = [inf] * len(out)
+    found[source] = 0.0
     todo = [(0.0, source)]
     while todo:
         distance, here = heappop(todo)
-        if here not in found:
-            found[here] = distance
+        if distance <= found[here]:
             for target, length in out[here]:
-                if target not in found:
-                    heappush(todo, (distance + length, target))
+                if distance + length < found[target]:
+                    found[target] = distance + length
+                    heappush(todo, (found[target], target))
     return found

@@ -9,12 +9,11 @@ from functools import partial
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
+from engage_hri.services.bus.deadlines import FORGOTTEN_AFTER, Deadlines
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import EventWriter, Mishap, PersonForgotten
 from engage_hri.services.recognition.events.person import PersonRecognition
 from engage_hri.services.recognition.events.scene import SessionScene, TakenUp
-from engage_hri.services.requests.deadlines import Deadlines
-from engage_hri.services.runtime.absent import FORGOTTEN_AFTER
 
 
 class People:

@@ -18,6 +18,7 @@ from engage_hri.schemas.body import Ray, RobotState
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose, VoiceActivity
 from engage_hri.schemas.units import Probability, Seconds, Stamp
 from engage_hri.schemas.world import World
+from engage_hri.services.bus.deadlines import Absent
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.interrupted_looks import Symbolic
 from engage_hri.services.recognition.events.presence import NEVER
@@ -28,7 +29,6 @@ from engage_hri.services.recognition.perceive.manipulation import Manipulation, 
 from engage_hri.services.recognition.perceive.speech import SpeechDetector
 from engage_hri.services.recognition.statistics.contact import attention
 from engage_hri.services.reports.action_reports import FACE_GRACE
-from engage_hri.services.runtime.absent import Absent
 
 Raw = HeadPose | VoiceActivity | World | RobotState
 

@@ -6,11 +6,11 @@ from functools import partial
 
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Probability, Seconds, Stamp
+from engage_hri.services.bus.deadlines import Deadlines
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import PersonForgotten
 from engage_hri.services.recognition.statistics.engagement import Engagement
 from engage_hri.services.recognition.statistics.tally import EventTally
-from engage_hri.services.requests.deadlines import Deadlines
 
 EVERYBODY = ""
 

@@ -12,7 +12,6 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.client.people.actions import PersonActions
-from engage_hri.services.simulation.hearing import Ears
 from engage_hri.services.simulation.human import (
     FACE,
     Act,
@@ -28,7 +27,7 @@ from engage_hri.services.simulation.human import (
     Understood,
     Withdraw,
 )
-from engage_hri.services.simulation.speaking import SpokenWords
+from engage_hri.services.simulation.speech import Ears, SpokenWords
 from engage_hri.services.tangram.people.seen_arms import SeenArms
 from engage_hri.services.tangram.people.table import Table
 

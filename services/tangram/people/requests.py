@@ -7,8 +7,8 @@ points. The words must be those of the tangram's requests.
 import re
 
 from engage_hri.schemas.footprints import SIDES
-from engage_hri.services.simulation.hearing import HeardSpeech
 from engage_hri.services.simulation.human import Lay
+from engage_hri.services.simulation.speech import HeardSpeech
 from engage_hri.services.tangram.table import TangramTable
 
 REQUEST = re.compile(

@@ -15,9 +15,8 @@ from engage_hri.services.client.people.perceived_person import PerceivedActions
 from engage_hri.services.client.people.shared_world import SharedWorld
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
-from engage_hri.services.simulation.attentive import AttentiveHuman
 from engage_hri.services.simulation.human import Human
-from engage_hri.services.simulation.listening import ListeningHuman
+from engage_hri.services.simulation.listening import AttentiveHuman, ListeningHuman
 from engage_hri.services.tangram.people.appendix_b import misplacing_rules, rules
 from engage_hri.services.tangram.people.cameras import Cameras
 from engage_hri.services.tangram.people.config import SimulationConfig

@@ -57,7 +57,7 @@ async def test_a_part_that_has_sagged_comes_back_within_its_limits(part: str, st
     body.see(WORLD)
     body.switch_faults([BodyFault(kind="weak", part=part, amount=strength)])
     await asyncio.sleep(4.0)
-    sagged = max(abs(body.bench.measured[joint] - body._plan()[joint]) for joint in body.bench.measured)
+    sagged = max(abs(body.bench.measured[joint] - body.planned()[joint]) for joint in body.bench.measured)
     assert sagged > math.radians(25.0)
     gauge = Gauge(body)
     body.switch_faults([])

@@ -16,10 +16,10 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.control.config import Variability
 from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.mujoco.body import MujocoBody
-from engage_hri.services.control.mujoco.description import Place, read
 from engage_hri.services.control.mujoco.ik import Chain
 from engage_hri.services.control.mujoco.model import MOTORS, scene
 from engage_hri.services.control.mujoco.physics import Physics
+from engage_hri.services.control.mujoco.robot import Place, read
 from engage_hri.services.control.testing import WORLD, Stage, performed, times
 from engage_hri.services.runtime.steps import finished
 from engage_hri.services.tangram.table import tangram_table
@@ -93,7 +93,7 @@ async def test_the_plan_and_the_joints_agree_within_the_stated_error_while_it_is
     body.see(WORLD)
 
     def look(at: float) -> None:
-        plan, measured = body._plan(), body.bench.measured
+        plan, measured = body.planned(), body.bench.measured
         for joint, angle in measured.items():
             part = kinematics.LIMIT[joint].part
             if part in worst:

@@ -74,7 +74,7 @@ async def test_a_face_is_seen(body: MujocoBody):
     await asyncio.sleep(2.0)
     model = body.bench.model
     before = model.geom("left_mouth").quat.copy()
-    show_face(model, body._plan())
+    show_face(model, body.planned())
 
     assert model.geom("left_mouth").quat[1] > before[1]
     stage.task.cancel()

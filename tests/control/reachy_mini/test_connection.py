@@ -12,7 +12,7 @@ pytest.importorskip("aiohttp", reason="the extra reachy-mini is not installed")
 
 from aiohttp import WSMsgType, web
 
-from engage_hri.services.control.reachy_mini import messages
+from engage_hri.services.control.reachy_mini import link
 from engage_hri.services.control.reachy_mini.connection import connected
 from engage_hri.services.control.reachy_mini.link import Daemon, Lost
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
@@ -104,8 +104,8 @@ async def server() -> AsyncIterator[Server]:
 
 async def test_it_reads_measurements_and_writes_targets_in_the_daemon_s_frame(server: Server):
     async with connected(ReachyMiniSettings(url=server.url)) as daemon:
-        measured = messages.measured(await daemon.measurement())
-        await daemon.command(messages.target(measured.pose))
+        measured = link.read(await daemon.measurement())
+        await daemon.command(link.target(measured.pose))
 
     assert measured.pose == pytest.approx(
         {"head_yaw": 0.3, "head_pitch": -0.2, "head_roll": -0.1, "body_yaw": 0.05, "body_lean": 0.0,
@@ -203,7 +203,7 @@ async def test_what_is_wrong_with_a_daemon_is_told_in_its_words(
 )
 def test_what_is_no_measurement_is_refused(text: str):
     with pytest.raises(ValueError):
-        messages.measured(text)
+        link.read(text)
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ import pytest
 from engage_hri.schemas.behaviors import BlockBehavior, FaceLexeme, Gaze, GazeShift, Head, Posture, PostureShift, Wait
 from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.services.control.contract.body import Body, BodyFailed
-from engage_hri.services.control.reachy_mini import messages
+from engage_hri.services.control.reachy_mini import link
 from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.reachy_mini.connection import connected
 from engage_hri.services.control.reachy_mini.link import Daemon
@@ -308,7 +308,7 @@ async def _followed(connect: Callable[[], object]) -> tuple[float, float, float]
         await _go_home(daemon)
         began, seen = loop.time(), []
         while (now := loop.time()) < began + 1.2:
-            yaw = messages.measured(await daemon.measurement()).pose["head_yaw"]
+            yaw = link.read(await daemon.measurement()).pose["head_yaw"]
             now = loop.time()
             seen.append((now - began, yaw))
             await daemon.command(_target(_course(now - began)))
@@ -330,7 +330,7 @@ def _course(at: float) -> float:
 
 async def _go_home(daemon: Daemon) -> None:
     """Lead the head to where the course begins, slowly."""
-    here = messages.measured(await daemon.measurement()).pose
+    here = link.read(await daemon.measurement()).pose
     for step in range(1, 16):
         share = 1.0 - step / 15
         await daemon.command(_target(share * here["head_yaw"], share * here["head_pitch"]))
@@ -339,4 +339,4 @@ async def _go_home(daemon: Daemon) -> None:
 
 def _target(yaw: float, pitch: float = 0.0) -> str:
     pose = {"head_yaw": yaw, "head_pitch": pitch, "head_roll": 0.0, "body_yaw": 0.0, "body_lean": 0.0}
-    return messages.target({**pose, "right_antenna": HOME["right"], "left_antenna": HOME["left"]})
+    return link.target({**pose, "right_antenna": HOME["right"], "left_antenna": HOME["left"]})

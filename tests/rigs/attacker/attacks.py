@@ -21,7 +21,7 @@ import zenoh
 
 from engage_hri.schemas import access, keys
 from engage_hri.schemas.access import BESIDE, Holder, most
-from engage_hri.services.bus.zenoh.crowd import MOST_TOKENS
+from engage_hri.services.bus.zenoh.router import MOST_TOKENS
 
 COMMAND = [sys.executable, "-m", "tests.rigs.attacker.attacks"]
 HUNDRED_MB = 100_000_000

@@ -26,7 +26,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import LOG, Hub, Received, Sample
 from engage_hri.services.bus.memory import MemoryBus, MemoryHub
-from engage_hri.services.bus.payloads import read_payload
+from engage_hri.services.bus.samples import read_payload
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.service import Service, serve
 from engage_hri.services.runtime.virtual_time import Deadlock, TimeRanOut, VirtualTimeLoop

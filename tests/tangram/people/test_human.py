@@ -21,7 +21,7 @@ from engage_hri.services.simulation.human import (
     Stop,
     Word,
 )
-from engage_hri.services.simulation.speaking import speech
+from engage_hri.services.simulation.speech import speech
 from engage_hri.services.tangram.people.appendix_b import rules
 
 AT = Stamp("loop", 0.0)

@@ -1,0 +1,108 @@
+"""The page of the window, served by this process: beside a robot that runs elsewhere, or with the demo in it."""
+
+import errno
+import os
+import secrets
+import sys
+import webbrowser
+from collections.abc import AsyncIterator, Callable
+from contextlib import AsyncExitStack, asynccontextmanager
+from importlib.util import find_spec
+from socket import gethostname
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.interface import Hub
+from engage_hri.services.commandline.shell.failing_output import complain
+from engage_hri.services.commandline.shell.options import Shown
+from engage_hri.services.commandline.shell.process import unique_name
+from engage_hri.services.runtime.installation import extra_command
+
+if TYPE_CHECKING:
+    from engage_hri.services.console.web.guard import Hosts
+
+NEEDED = ("starlette", "uvicorn", "nicegui")
+"""Packages without which there is no window."""
+LOCAL = ("127.0.0.1", "::1", "localhost")
+TOKEN = 12
+"""Bytes of chance in a token."""
+
+
+def lacking() -> str:
+    """A package that the window needs and that is not installed; empty: there is none."""
+    return next((name for name in NEEDED if find_spec(name) is None), "")
+
+
+def can_open(terminal: bool) -> bool:
+    """Tell whether somebody would see a window: there is a terminal and a display, and what it needs is installed."""
+    shows = sys.platform in ("darwin", "win32") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
+    return terminal and shows and not lacking()
+
+
+def web() -> ModuleType:
+    """Load the web server, which takes a second. Raises InputRefused if it is not installed."""
+    if package := lacking():
+        fault = Fault(reason=f"{package} is not installed", where="console", advice=extra_command("console"))
+        raise InputRefused(fault)
+    from engage_hri.services.console.web import server
+
+    return server
+
+
+def hosts(shown: Shown) -> "Hosts":
+    """Names by which the page may be called: else a page of others could call it by a name of theirs."""
+    from engage_hri.services.console.web.guard import Hosts
+
+    if shown.host in LOCAL:
+        return Hosts((*LOCAL, *(shown.called or ())))
+    own = gethostname()
+    return Hosts((*LOCAL, shown.host, own, f"{own}.local", *(shown.called or ())), addresses=True)
+
+
+@asynccontextmanager
+async def served(
+    app: Any, shown: Shown, token: str, tell: Callable[[str], None], *, role: str, port: int = 0, opens: bool = True
+) -> AsyncIterator[None]:
+    """Serve a page while the body of `async with` runs. Raises RunFailed if the port is taken.
+
+    tell: gets its address. role: of whoever has the token. port: 0: any that is free. opens: show it in the browser.
+    """
+    async with AsyncExitStack() as stack:
+        try:
+            port = await stack.enter_async_context(web().serving(app, shown.host, port))
+        except OSError as error:
+            is_taken = error.errno == errno.EADDRINUSE
+            free = "is another window there? --port 0 takes any that is free"
+            advice = free if is_taken else "--host takes an address of this machine"
+            reason = os.strerror(error.errno) if error.errno else str(error)
+            raise RunFailed(Fault(reason=reason, where=f"{shown.host}:{port}", advice=advice)) from error
+        host = "127.0.0.1" if shown.host in ("0.0.0.0", "::") else shown.host
+        url = f"http://{f'[{host}]' if ':' in host else host}:{port}/" + (f"?token={token}" if token else "")
+        tell(url)
+        if shown.host not in LOCAL:
+            seen = f"everybody who reaches {shown.host} sees all of this robot, and the people before it, unencrypted"
+            more = f"; who has the token in the address above takes part as {role}"
+            complain(seen if role == "observer" else seen + more)
+        if opens:
+            webbrowser.open(url)
+        yield
+
+
+@asynccontextmanager
+async def windowed(hub: Hub, shown: Shown, began: Seconds, tell: Callable[[str], None]) -> AsyncIterator[None]:
+    """Show all that goes on at this hub in the browser, while the body of `async with` runs.
+
+    began: the instant from which the page counts its seconds. tell: gets the address of the window.
+    """
+    server = web()
+    from engage_hri.services.console.web.orders import Script
+    from engage_hri.services.console.web.service import window
+
+    token, bus = secrets.token_urlsafe(TOKEN), hub.join(unique_name("console"), "wizard")
+    async with window(hub, bus, Script(()), began=began) as following:
+        bus.declare_alive()
+        app = server.application(following, hosts(shown), token)
+        async with served(app, shown, token, lambda url: tell(f"the window: {url}"), role=bus.role):
+            yield
