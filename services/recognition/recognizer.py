@@ -120,7 +120,7 @@ class Recognizer:
         return self._told([*results, *self.session.advance(until)])
 
     def contacts(self) -> dict[str, Probability]:
-        """How much of a contact each person has with the robot, of those of whom that may have changed since then.
+        """Contact of each person with the robot, of those for whom it may have changed since the last call.
 
         By what the session knows, or by how much the head attends to the robot, whichever is more.
         """

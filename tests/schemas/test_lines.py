@@ -101,7 +101,7 @@ def test_a_connection_event_that_has_only_begun() -> None:
     assert line(message) == (
         '{"type":"connection_event","id":"e-1","kind":"directed_gaze","initiator":"robot","responder":"human",'
         '"state":"started","at":3.0,"started":3.0,"objects":["cup"],"cause":"reference","optional":false,'
-        '"delay":null,"delay_error":0.0,"duration":null,"limit":null,"response":null,"confidence":1.0,"block":"","behavior":"","turn":"",'
+        '"delay":null,"delay_error":0.0,"duration":null,"limit":null,"response":null,"answered_by":"","confidence":1.0,"block":"","behavior":"","turn":"",'
         '"words":"","retold":false}'
     )
 

@@ -1,4 +1,4 @@
-"""To whom a person speaks. Pure.
+"""Addressees of what a person says. Pure.
 
 At a table with several people most of what is said is for somebody else: in recorded meetings of four two sentences
 of three. A robot that took all of it for its own would be asked things that nobody asked it, and its own questions
@@ -90,7 +90,7 @@ class OwnSpeech(Struct):
 
 
 def named(words: str, names: Mapping[str, str]) -> Addressees:
-    """Those who are called by the words. names: actor ids by the names by which people call them.
+    """People and robots who are called by the words. names: actor ids by the names by which people call them.
 
     A name calls somebody if it stands first, last after a comma, or last of a few words: "hello robot". In the
     middle, and at the end of a sentence, it may be what the sentence is about.

@@ -13,7 +13,7 @@ from engage_hri.services.recognition.events.adjacency_pair import AdjacencyPair
 from engage_hri.services.recognition.events.backchannel import BRIEF, UNDECIDED, Backchannel
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.limits import in_time
-from engage_hri.services.recognition.events.listener_sign import WORDS_WAIT, ListenerSign, Part
+from engage_hri.services.recognition.events.listener_sign import WORDS_WAIT, ListenerSign, SignPart
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import Question, SessionScene
 from engage_hri.services.text.listening import is_listening
@@ -146,9 +146,9 @@ class Conversation:
     def _signs(self, action: Action, at: Seconds, confidence: Probability) -> None:
         if self._sign is not None and self._sign.until is not None:
             self._was_backchannel(self._sign, self._sign.until)  # its words have not come until the next one begins
-        self._joins(Part(action, at, confidence))
+        self._joins(SignPart(action, at, confidence))
 
-    def _joins(self, part: Part) -> None:
+    def _joins(self, part: SignPart) -> None:
         """Make a part of the sign that goes on, or of a new one."""
         if self._sign is None:
             self._sign = ListenerSign([])
@@ -200,7 +200,7 @@ class Conversation:
         self.own_backchannel.speaks(event)
         self.own_backchannel.ends(until)
 
-    def _answers(self, part: Part, at: Seconds, reading: InterjectionReading = "interruption") -> None:
+    def _answers(self, part: SignPart, at: Seconds, reading: InterjectionReading = "interruption") -> None:
         """Take a part of the sign as a turn of the person since it began."""
         self._sign = None
         if part.action == "speak":
@@ -232,7 +232,7 @@ class Conversation:
         pair, listens = self.pair, self._listens(since)
         if listens:
             if pair.was_listening(since):
-                part = Part("speak", since, self._speech_confidence, self._speeches.get(since))
+                part = SignPart("speak", since, self._speech_confidence, self._speeches.get(since))
                 if part.until is None:
                     self._joins(part)
                 else:

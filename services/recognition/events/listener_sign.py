@@ -25,7 +25,7 @@ WORDS_WAIT: Seconds = 1.5
 """Time from the beginning of a speech in which its words may come, where somebody tells words. Laughter has none."""
 
 
-class Part(Struct):
+class SignPart(Struct):
     """A speech, or a gesture. until: None: it goes on."""
 
     action: Action
@@ -40,7 +40,7 @@ class ListenerSign(Struct):
     is_wordless: the words of its speech have not come in time.
     """
 
-    parts: list[Part]
+    parts: list[SignPart]
     is_wordless: bool = False
 
     @property
@@ -54,15 +54,15 @@ class ListenerSign(Struct):
         return None if None in ends else max(end for end in ends if end is not None)
 
     @property
-    def speeches(self) -> list[Part]:
+    def speeches(self) -> list[SignPart]:
         return [part for part in self.parts if part.action == "speak"]
 
     @property
     def confidence(self) -> Probability:
         return min(part.confidence for part in self.parts)
 
-    def going_on(self, action: Action | None = None) -> list[Part]:
-        """What of it goes on. action: only what is such a one."""
+    def going_on(self, action: Action | None = None) -> list[SignPart]:
+        """Parts that go on. action: only those."""
         return [part for part in self.parts if part.until is None and action in (None, part.action)]
 
     def deadline(self, limit: Seconds) -> Seconds | None:

@@ -211,7 +211,7 @@ class PersonRecognition:
 
     @property
     def contact(self) -> Probability | None:
-        """How much of a contact with the robot there is now; None: nobody has told where the person looks."""
+        """Contact with the robot now, from 0 to 1; None: nobody has told where the person looks."""
         together = any(each.is_shared for each in self.gaze_machines())
         if self.presence.here and (self.on_robots_face or together or self.talk.speaks_to_robot):
             return 1.0
@@ -219,7 +219,7 @@ class PersonRecognition:
 
     @property
     def _face(self) -> str:
-        """Whose face the person looks at; "": nobody's."""
+        """Actor whose face the person looks at; "": none."""
         return next(filter(self._scene.is_face, self.gaze.targets), "")
 
     def looks(self, targets: tuple[str, ...], at: Seconds, confidence: Probability = 1.0) -> None:

@@ -58,7 +58,7 @@ class Question(NamedTuple):
 
 
 class TakenUp(NamedTuple):
-    """Somebody has answered the robot in another's place. asked: who was asked."""
+    """Answer to the robot in another's place. asked: who was asked. person: who has answered."""
 
     asked: str
     person: str

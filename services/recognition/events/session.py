@@ -106,7 +106,7 @@ class Session:
         return sorted(speeches, key=lambda each: (each[1], each[0]))
 
     def contacts(self) -> dict[str, Probability | None]:
-        """How much of a contact there is with each for whom it may have changed since the last call."""
+        """Contact with each person for whom it may have changed since the last call."""
         touched, self._people.touched = self._people.touched, set()
         return {id: self.persons[id].contact for id in touched if id in self.persons}
 
@@ -252,7 +252,7 @@ class Session:
                 self._tell(actor, at, step)
 
     def addressees_of(self, behavior: str) -> Addressees | None:
-        """To whom a behavior of the robot, `block:behavior`, is; None: to nobody known."""
+        """Addressees of a behavior of the robot, `block:behavior`; None: they are not known."""
         block = behavior.rpartition(":")[0]
         if block in self._addressed:
             return self._addressed[block]

@@ -1,4 +1,4 @@
-"""What is said between one person and the robot, told to their `Conversation` once it is known to whom it is.
+"""Talk of one person and the robot, told to their `Conversation` once it is known to whom each speech is.
 
 With nobody else there all is known at once. In company it is known only at the end of a speech, or with its words,
 whether it is for the robot (`addressing`). What the robot says or asks meanwhile may be the answer to it. So from
@@ -56,7 +56,7 @@ class Talk:
 
     @property
     def speaks_to(self) -> Addressees:
-        """To whom the speech that goes on is; empty: that is not known, or there is none."""
+        """Addressees of the speech that goes on; empty: they are not known, or there is none."""
         return NOBODY if self._speech is None or self._speech.to is None else self._speech.to
 
     @property

@@ -7,6 +7,10 @@
 A symbolic report of an action has precedence: from the first one on, raw perception of that action of that person is
 ignored, as long as the `Attention` lives. Actions carry the times at which they began and ended, though they are
 known only later; until then `undecided` says from when on.
+
+How much a head attends to the robot is a matter of degree. Heads of people who attend to a robot point some twenty
+degrees beside its camera: they look at its middle, at what it holds, or with the eyes alone (recordings of ROS4HRI's
+hri_engagement, where a cone of 20 degrees tells the engaged from the disengaged, and one of 10 finds neither).
 """
 
 import math
@@ -16,7 +20,7 @@ from itertools import chain
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.body import Ray, RobotState
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose, VoiceActivity
-from engage_hri.schemas.units import Probability, Seconds, Stamp
+from engage_hri.schemas.units import Degrees, Probability, Seconds, Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import Absent
 from engage_hri.services.recognition.config import RecognitionConfig
@@ -27,10 +31,18 @@ from engage_hri.services.recognition.perceive.gaze_targets import GazeTargets, i
 from engage_hri.services.recognition.perceive.looks import ROUNDING, Change, Looking
 from engage_hri.services.recognition.perceive.manipulation import Manipulation, PersonChanges
 from engage_hri.services.recognition.perceive.speech import SpeechDetector
-from engage_hri.services.recognition.statistics.contact import attention
 from engage_hri.services.reports.action_reports import FACE_GRACE
 
+FULL_ATTENTION: Degrees = 20.0
+"""Angle between a head and the line to the robot's face up to which the head attends to it, by these recordings."""
+NO_ATTENTION: Degrees = 30.0
+"""Angle from which on it does not."""
 Raw = HeadPose | VoiceActivity | World | RobotState
+
+
+def attention(angle: Degrees) -> Probability:
+    """Attention of a head to the robot, 0 to 1. angle: between its direction and the line to the robot's face."""
+    return max(0.0, min(1.0, (NO_ATTENTION - angle) / (NO_ATTENTION - FULL_ATTENTION)))
 
 
 class _Actor:

@@ -4,32 +4,19 @@ Who looks at the robot, speaks to it, or looks with it at a thing is in contact 
 story of a minute is one event. So the pace of beginnings alone would call the most engaged of all people disengaged,
 and somebody who only glances back now and then engaged. The share is an exponential mean; what went on
 `CONTACT_MEMORY` seconds ago counts for a third of what goes on now.
-
-How much a head attends to the robot is a matter of degree. Heads of people who attend to a robot point some twenty
-degrees beside its camera: they look at its middle, at what it holds, or with the eyes alone (recordings of ROS4HRI's
-hri_engagement, where a cone of 20 degrees tells the engaged from the disengaged, and one of 10 finds neither).
 """
 
 import math
 
-from engage_hri.schemas.units import Degrees, Probability, Seconds
+from engage_hri.schemas.units import Probability, Seconds
 
 CONTACT_MEMORY: Seconds = 8.0
 """Time constant of the mean. Ours."""
-FULL_ATTENTION: Degrees = 20.0
-"""Angle between a head and the line to the robot's face up to which the head attends to it, by these recordings."""
-NO_ATTENTION: Degrees = 30.0
-"""Angle from which on it does not."""
 SETTLED: Probability = 0.01
 """Difference from what goes on now below which the share counts as the same."""
 
 
-def attention(angle: Degrees) -> Probability:
-    """How much a head attends to the robot. angle: between its direction and the line to the robot's face."""
-    return max(0.0, min(1.0, (NO_ATTENTION - angle) / (NO_ATTENTION - FULL_ATTENTION)))
-
-
-class Contact:
+class ContactShare:
     """Share of contact of one person."""
 
     def __init__(self) -> None:

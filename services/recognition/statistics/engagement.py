@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import HYSTERESIS, RecognitionConfig
-from engage_hri.services.recognition.statistics.contact import CONTACT_MEMORY, Contact
+from engage_hri.services.recognition.statistics.contact import CONTACT_MEMORY, ContactShare
 from engage_hri.services.recognition.statistics.tally import EventTally
 
 ENOUGH_EVENTS = 5
@@ -69,7 +69,7 @@ class Engagement:
     def __init__(self, config: RecognitionConfig, tally: EventTally) -> None:
         self.estimate = UNKNOWN
         self.busy = False
-        self.contact = Contact()
+        self.contact = ContactShare()
         self._config = config
         self._tally = tally
         self._busy_until: Seconds = float("-inf")
