@@ -126,8 +126,8 @@ class Recognizer:
         """
         changed = self.session.contacts()
         for id, much in self._attention.attended.items():
-            self._heads[id] = much
             if id in self.session.persons:
+                self._heads[id] = much
                 changed.setdefault(id, self.session.persons[id].contact)
         self._attention.attended = {}
         known = {

@@ -80,6 +80,7 @@ class People:
             self._agenda.clear(id)
             self._here.pop(id, None)
             self._scene.forget_person(id)
+            self.touched.discard(id)
             del self.persons[id], self._unseen[id]
             self._writer.effects.append(PersonForgotten(id))
             self._follow_speech(now)

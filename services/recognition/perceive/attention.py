@@ -217,6 +217,7 @@ class Attention:
         for id in self._mentioned.forgotten(now):
             del self._actors[id]
             self._attended.pop(id, None)
+            self.attended.pop(id, None)
             self._gaze_targets.forget_face(id)
 
     # -- one person ---------------------------------------------------------------------------------------------
