@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import Head, Speech, Wait
 from engage_hri.schemas.blocks import Block, Fired
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.realizer.export import described, firings, tokens
+from engage_hri.services.realizer.export import described, firings
 from engage_hri.services.realizer.plan.known import BLOCK_END, Known, coming_with, is_behind
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
@@ -125,9 +125,7 @@ def test_the_message_about_a_net_has_all_of_it() -> None:
     assert message.fired == (Fired(transition=0, time=0.0), Fired(transition=2, time=1.25))
 
 
-def test_tokens_and_firings_keep_their_numbers_and_their_order() -> None:
-    assert tokens(bytes((0, 1, 0, 2, 1))) == (1, 3, 4)
-    assert tokens(b"") == ()
+def test_firings_keep_their_numbers_and_are_told_in_order() -> None:
     assert firings({3: 0.5, 1: 0.25}) == (Fired(transition=3, time=0.5), Fired(transition=1, time=0.25))
 
 
