@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, NoReply
-from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Reading, Received, Subscription
 from engage_hri.services.client.event_stream import EventStream
@@ -46,6 +46,21 @@ class Feed(Reading[M]):
     def close(self) -> None:
         """End the feed: nothing more comes, and a task that waits in `next` gets None."""
         self._subscription.close()
+
+
+class LevelFeed(Feed[Statistics]):
+    """Statistics of people, each only if its level is another than that told before."""
+
+    def __init__(self, subscription: Subscription, now: Callable[[], Seconds]) -> None:
+        super().__init__(subscription, (Statistics,), now)
+        self._levels: dict[str, str] = {}
+
+    def _is_wanted(self, received: Received) -> bool:
+        told = received.message
+        if not isinstance(told, Statistics) or not told.actor or self._levels.get(told.actor) == told.level:
+            return False
+        self._levels[told.actor] = told.level
+        return True
 
 
 async def first_of(

@@ -36,13 +36,13 @@ from engage_hri.schemas.fragments import (
 )
 from engage_hri.schemas.participants import PeerGone
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, Utterance
-from engage_hri.schemas.recognition import Statistics
+from engage_hri.schemas.recognition import Floor, Interjection, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.config import Mode
 from engage_hri.services.bus.interface import Bus, Hub, Keep
 from engage_hri.services.client.event_stream import EventStream
-from engage_hri.services.client.feeds import ActionFeed, EventFeed, Feed, NewFeed, first_of
+from engage_hri.services.client.feeds import ActionFeed, EventFeed, Feed, LevelFeed, NewFeed, first_of
 from engage_hri.services.client.inputs import (
     BlockSource,
     FragmentSource,
@@ -305,6 +305,23 @@ class Robot(OrderedRobot):
             ValueError: a name that can be no person.
         """
         return await first_of(self.statistics_updates(actor), f"statistics of {actor}", timeout)
+
+    def engagement(self) -> Feed[Statistics]:
+        """Follow the engagement of people: the level of each as it is now, and whenever it is another.
+
+        `level` says it in a word, `engagement` as a number, `reasons` why. Who comes is `engaging`, who drifts away
+        `disengaging`.
+        """
+        self._requests.check()
+        return LevelFeed(self._bus.subscribe(keys.ANY_STATISTICS), self.now)
+
+    def floor(self) -> Feed[Floor]:
+        """Follow who speaks, and to whom: now, and at every change."""
+        return self._feed((Floor,), keys.FLOOR)
+
+    def interjections(self) -> Feed[Interjection]:
+        """Follow what people say into the robot's turns: at once, and again when it is decided what it is."""
+        return self._feed((Interjection,), keys.ANY_INTERJECTION)
 
     def actions(self) -> Feed[ActionBegan | ActionEnded | ActorFound | ActorLost]:
         """Follow the actions of the robot and of people as they are seen, and the coming and going of people.
