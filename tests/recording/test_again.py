@@ -176,8 +176,8 @@ async def test_a_recording_that_begins_in_the_middle_says_that_it_lacks_what_was
     assert len(life.again) > 10
     first = min(one.at.seconds for one in told(life.live))
     changes = {one.message for pair in life.other_words for one in (pair.live, pair.again) if one is not None}
-    later = [one for one in told(life.live) if one.started.seconds > first + 10.0]
-    assert len(later) > 10
+    later = [one for one in told(life.live) if one.started.seconds > first + 20.0]
+    assert len(later) > 5
     assert not changes & set(later)
 
 
