@@ -162,7 +162,7 @@ async def test_the_file_of_a_killed_recorder_gives_the_same_events_as_far_as_it_
 async def test_a_recording_that_begins_in_the_middle_says_that_it_lacks_what_was_before(tmp_path: Path) -> None:
     async with MemoryHub() as hub:
         recognition = await run(hub)
-        acting = asyncio.create_task(act(hub, 3, 60.0))
+        acting = asyncio.create_task(act(hub, 3, 150.0))
         await asyncio.sleep(30.0)
         async with recording_to(tmp_path / "a.mcap", hub):
             await acting
@@ -176,8 +176,8 @@ async def test_a_recording_that_begins_in_the_middle_says_that_it_lacks_what_was
     assert len(life.again) > 10
     first = min(one.at.seconds for one in told(life.live))
     changes = {one.message for pair in life.other_words for one in (pair.live, pair.again) if one is not None}
-    later = [one for one in told(life.live) if one.started.seconds > first + 20.0]
-    assert len(later) > 5
+    later = [one for one in told(life.live) if one.started.seconds > first + 60.0]
+    assert len(later) > 10
     assert not changes & set(later)
 
 
