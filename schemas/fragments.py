@@ -141,7 +141,7 @@ class HeardText(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class Interjected(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """What a person has said into a turn of the robot, and what came of it.
+    """Speech of a person into a turn of the robot, and what came of it.
 
     actor: the person. since: when the speech began. words: as far as they were known.
     reading: what it is, as in `Interjection`; `open`: nobody has decided that.

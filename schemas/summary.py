@@ -54,7 +54,7 @@ class HeardWords(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class SaidInto(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """What somebody has said into the turn. reading: what it was taken for; `open`: nobody knows.
+    """Words that somebody has said into the turn. reading: what it was taken for; `open`: nobody knows.
 
     went_on: the robot has gone on with its words after it.
     """
@@ -181,7 +181,7 @@ def _heard(texts: Iterable[HeardText]) -> tuple[HeardWords, ...]:
 
 
 def _interjections(all_told: Iterable[Interjected]) -> tuple[SaidInto, ...]:
-    """What was said into the turn, in order; fragments of one turn tell some of it again."""
+    """Speech into the turn, in order; fragments of one turn tell some of it again."""
     newest = {(each.actor, each.since): each for each in all_told}
     return tuple(
         SaidInto(who=each.actor, reading=each.reading, text=each.words, went_on=each.went_on)

@@ -1,4 +1,4 @@
-"""People who speak into the robot's turn at any instant: each outcome says who and what, and each word is said once."""
+"""People speak into the robot's turn at any instant: each outcome says who and what, and each word is said once."""
 
 import asyncio
 import random

@@ -1,4 +1,4 @@
-"""What people say into the robot's turns, and what came of it. Recognition says what it is; here it is kept. Pure."""
+"""Speech of people into the robot's turns, and what came of it. Recognition says what it is; here it is kept. Pure."""
 
 from collections.abc import Collection, Mapping
 
@@ -88,7 +88,7 @@ class Interjections:
                 self._release(each, now, went_on=went_on)
 
     def of_turn(self, turn: str) -> tuple[Interjected, ...]:
-        """What was said into a turn, in order."""
+        """Speech into a turn, in order."""
         return tuple(
             Interjected(
                 actor=each.told.actor, since=each.told.since, reading=each.told.reading, words=each.told.words,

@@ -136,7 +136,7 @@ class Words:
         )  # fmt: skip
 
     def _told_early(self, person: _Person, words: TimedWords) -> Worded | None:
-        """That words will come, and addressees that perception knows before it is sure of these."""
+        """News that words will come, and addressees that perception knows before it is sure of these."""
         speech = person.speech_with(words)
         return None if speech is None else Worded(actor=words.actor, since=speech, text="", to=words.to)
 
