@@ -1,4 +1,4 @@
-"""Speech of people into the robot's turns, and what came of it. Recognition says what it is; here it is kept. Pure."""
+"""Speech of people into the robot's turns, and what came of it: recognition says what it is. Pure."""
 
 from collections.abc import Collection, Mapping
 
