@@ -188,7 +188,8 @@ TABLE: tuple[Row, ...] = (
     *_service(
         "generation", keys.FRAGMENT_FEEDBACK, keys.TURN_CLOSED, keys.HEAD_OWNER, keys.STUDY_CONDITION,
         heard=(keys.ANY_REQUEST_STATE, keys.FEEDBACK, keys.ANY_CONNECTION_EVENT, keys.WORLD, keys.SYNC_POINT,
-               keys.ANY_ACTION, keys.ANY_PERCEIVED_ONGOING, keys.UTTERANCE, keys.ROBOT_STATE, keys.ANY_STATISTICS),
+               keys.ANY_ACTION, keys.ANY_PERCEIVED_ONGOING, keys.UTTERANCE, keys.ROBOT_STATE, keys.ANY_STATISTICS,
+               keys.ANY_INTERJECTION),
     ),
     *_commands("generation", "block", "behavior", "turn"),
     Row("generation", "asks", keys.DESCRIBE),
@@ -198,6 +199,7 @@ TABLE: tuple[Row, ...] = (
     Row("realizer", "asks", keys.ESTIMATE),
     *_service(
         "recognition", keys.ANY_CONNECTION_EVENT, keys.RECOGNIZED_ACTION, keys.ANY_OPEN_EVENTS, keys.ANY_STATISTICS,
+        keys.ANY_INTERJECTION,
         heard=(keys.ROBOT_ACTION, keys.PERCEIVED_ACTION, keys.UTTERANCE, keys.ROBOT_ONGOING,
                keys.ANY_PERCEIVED_ONGOING,
                keys.FEEDBACK, keys.HEAD_OWNER, keys.WORLD, *_RAW, keys.ROBOT_STATE),

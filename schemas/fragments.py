@@ -8,7 +8,7 @@ from msgspec import Meta, Struct
 from engage_hri.schemas.behaviors import Action, Constraint, FragmentBehavior, Reference, Speech
 from engage_hri.schemas.blocks import SpokenText, Unread
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.recognition import ConnectionEvent, InterjectionReading
 from engage_hri.schemas.requests import Outcome, Request
 from engage_hri.schemas.text import has_words
 from engage_hri.schemas.units import Probability, Seconds, Stamp
@@ -140,6 +140,22 @@ class HeardText(Struct, frozen=True, kw_only=True, omit_defaults=True):
     to: tuple[str, ...] = ()
 
 
+class Interjected(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Speech of a person into a turn of the robot, and what came of it.
+
+    actor: the person. since: when the speech began. words: as far as they were known.
+    reading: what it is, as in `Interjection`; `open`: nobody has decided that.
+    held: seconds for which the robot has waited for the decision. went_on: the turn has gone on after it.
+    """
+
+    actor: str
+    since: Stamp
+    reading: InterjectionReading
+    words: str = ""
+    held: Seconds = 0.0
+    went_on: bool = False
+
+
 class FragmentOutcome(Outcome, frozen=True, kw_only=True, tag="fragment_outcome", omit_defaults=True):
     """evt: generation -> requester: the end of a fragment: its block has ended and its gazes are decided.
 
@@ -166,6 +182,8 @@ class FragmentOutcome(Outcome, frozen=True, kw_only=True, tag="fragment_outcome"
     """Each connection event of the turn in its last known state, by start."""
     heard: tuple[HeardText, ...] = ()
     """What people have said since the turn before was over, by start."""
+    interjections: tuple[Interjected, ...] = ()
+    """What people have said into the turn, by start, and what came of it."""
     choices: tuple[ReferenceChoice, ...] = ()
     warnings: tuple[str, ...] = ()
     fault: Fault | None = None
@@ -190,6 +208,8 @@ class TurnClosed(Struct, frozen=True, kw_only=True, tag="turn_closed", omit_defa
     """Each connection event of the turn in its last known state, by start."""
     heard: tuple[HeardText, ...] = ()
     """What people have said since the turn before was over, its answer among it, by start."""
+    interjections: tuple[Interjected, ...] = ()
+    """What people have said into the turn, by start, and what came of it."""
 
 
 ClaimKind = Literal["inhibition", "fragment", "glance", "response", "hands", "face", "none"]

@@ -9,8 +9,8 @@ from msgspec import Struct
 
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.fragments import FragmentOutcome, HeardText
-from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.fragments import FragmentOutcome, HeardText, Interjected
+from engage_hri.schemas.recognition import ConnectionEvent, InterjectionReading
 from engage_hri.schemas.text import joined
 from engage_hri.schemas.units import Seconds
 
@@ -53,6 +53,18 @@ class HeardWords(Struct, frozen=True, kw_only=True, omit_defaults=True):
     to: tuple[str, ...] = ()
 
 
+class SaidInto(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Words that somebody has said into the turn. reading: what it was taken for; `open`: nobody knows.
+
+    went_on: the robot has gone on with its words after it.
+    """
+
+    who: str
+    reading: InterjectionReading
+    text: str = ""
+    went_on: bool = False
+
+
 class Summary(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Result of a fragment or a turn, short enough for a language model.
 
@@ -66,6 +78,7 @@ class Summary(Struct, frozen=True, kw_only=True, omit_defaults=True):
     absent: the turn expects none, or was broken off by other things than words, or recognition has gone.
     answered_by: id of the person who answered.
     heard: what people have said during and after the turn, and before it since the last, in order.
+    interjections: what people have said into the turn, in order, and whether the robot has gone on after it.
     problems: what went wrong, in words.
     """
 
@@ -80,6 +93,7 @@ class Summary(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Time from the end of the turn to the answer; negative for an earlier answer."""
     answered_by: str = ""
     heard: tuple[HeardWords, ...] = ()
+    interjections: tuple[SaidInto, ...] = ()
     problems: tuple[str, ...] = ()
 
     @property
@@ -141,6 +155,7 @@ def summary(*outcomes: FragmentOutcome) -> Summary:
         answer_delay=_rounded(pair.delay) if pair and pair.response else None,
         answered_by=(pair.answered_by or pair.responder) if pair and pair.response else "",
         heard=_heard(text for outcome in outcomes for text in outcome.heard),
+        interjections=_interjections(each for outcome in outcomes for each in outcome.interjections),
         problems=_problems(wrong),
     )
 
@@ -163,6 +178,15 @@ def _heard(texts: Iterable[HeardText]) -> tuple[HeardWords, ...]:
     newest = {(each.actor, each.id, each.began): each for each in texts}
     said = sorted(newest.values(), key=lambda each: (each.began.seconds, each.actor, each.id))
     return tuple(HeardWords(who=each.actor, text=each.text, to=each.to) for each in said[-MOST_HEARD:])
+
+
+def _interjections(all_told: Iterable[Interjected]) -> tuple[SaidInto, ...]:
+    """Speech into the turn, in order; fragments of one turn tell some of it again."""
+    newest = {(each.actor, each.since): each for each in all_told}
+    return tuple(
+        SaidInto(who=each.actor, reading=each.reading, text=each.words, went_on=each.went_on)
+        for each in newest.values()
+    )
 
 
 def _problems(texts: Iterable[str]) -> tuple[str, ...]:
@@ -203,6 +227,10 @@ def _sentences(it: Summary) -> Iterable[str]:
             yield "No answer came."
         case str() as action:
             yield f"Answered by {it.answered_by}: {action}, after {it.answer_delay or 0.0:g} s."
+    for into in it.interjections:
+        text = f' "{into.text}"' if into.text else ""
+        how = "the robot went on" if into.went_on else "the robot broke off"
+        yield f"{into.who} spoke into it ({into.reading}){text}: {how}."
     for who, said in groupby(it.heard, key=lambda each: each.who):
         yield f'Heard from {who}: "{" ".join(each.text for each in said)}"'
     if it.problems:

@@ -262,7 +262,12 @@ class _Speaking:
                 if (closed := self._closed) is not None:
                     fault = Fault(reason=closed.reason, where=self.id)
                     cut = replace(
-                        outcomes[-1], status="interrupted", events=closed.events, heard=closed.heard, fault=fault
+                        outcomes[-1],
+                        status="interrupted",
+                        events=closed.events,
+                        heard=closed.heard,
+                        interjections=closed.interjections,
+                        fault=fault,
                     )
                     outcomes[-1] = self._robot._with_new_words(cut)
             outcomes[-1] = replace(outcomes[-1], unsaid=(*outcomes[-1].unsaid, rest))

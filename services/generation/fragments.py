@@ -18,6 +18,7 @@ from engage_hri.schemas.blocks import (
     BlockOutcome,
     InterruptBehavior,
     PerformBlock,
+    SteerPerformance,
     SyncPointProgress,
     WarningFeedback,
 )
@@ -25,8 +26,8 @@ from engage_hri.schemas.body import AbortBehavior, WordSpoken
 from engage_hri.schemas.faults import EngageError, Fault, RequestRefused, RunFailed, bug
 from engage_hri.schemas.fragments import PerformFragment
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import ActionBegan, ActionEnded, Utterance
-from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
+from engage_hri.schemas.perception import ActionEnded, Utterance
+from engage_hri.schemas.recognition import ConnectionEvent, Interjection, SignalTurn
 from engage_hri.schemas.requests import Accepted, Heard, Refused
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
@@ -59,6 +60,8 @@ from engage_hri.services.runtime.intake import AnswerRequest, MachineClocks, Pub
 FRAGMENTS = 200
 """Number of fragments that may be waiting or performed at once; one more is refused, so that a task that never waits
 is told so. Ours."""
+LAST_WORDS = 2
+"""Number of words, the one being said among them, that end a turn in any case: people begin to answer over them."""
 _RECOGNITION_AWAY = ("away", "recognition")
 
 
@@ -89,10 +92,10 @@ class Fragments:
         self._tell = tell
         self._now: Seconds = 0.0
         """Time of this step."""
-        self._turns = TurnPolicy(robot, config, sight)
+        self._turns = TurnPolicy(sight, config.barge_in)
         self._events = TurnEvents()
         self._heard = HeardWords()
-        self._outcomes = TurnOutcomes(self._events, self._heard, config, sight)
+        self._outcomes = TurnOutcomes(self._events, self._heard, self._turns.interjections, config, sight)
         self._gazes = GazesOfFragments()
         self._body = BodyLink()
         self._ways = Ways(tell)
@@ -102,7 +105,7 @@ class Fragments:
         """Fragments by request id, in the order in which they came, from `admit` until their outcome is told."""
         self._is_choosing = False
         """True while a choice is looked at again."""
-        self._signals = 0
+        self._signals = self._holds = 0
         self._waits = Silences[tuple[str, str]](sight)
         """Times until which recognition may be away, and until which it is to decide the events of a request."""
 
@@ -152,7 +155,7 @@ class Fragments:
 
     def feed(
         self,
-        message: World | ConnectionEvent | ActionBegan | ActionEnded | SyncPointProgress | WordSpoken | Utterance,
+        message: World | ConnectionEvent | Interjection | ActionEnded | SyncPointProgress | WordSpoken | Utterance,
         now: Seconds,
     ) -> None:
         match message:
@@ -162,20 +165,18 @@ class Fragments:
             case ConnectionEvent():
                 self._events.feed(message, now)
                 self._discourse = self._discourse.hearing(message, self._robot)
-            case ActionBegan() | ActionEnded():
-                self._turns.feed(message, now)
+            case Interjection():
+                self._turns.interject(message, now)
+            case ActionEnded(action="speak"):
+                self._turns.interjections.falls_silent(message.actor)
             case SyncPointProgress():
-                self._follow(message)
+                self._follow(message, now)
             case WordSpoken(block=block):
                 for performance in self._live.values():
                     if performance.fragment.id == block and not performance.is_over:
                         performance.hear(message)
             case Utterance() if message.actor != self._robot:
                 self._heard.feed(message, now)
-                self._turns.hear(
-                    message.actor, message.text, began=self._clock.local(message.began, now), is_final=message.final,
-                    is_line=message.began == message.at,
-                )  # fmt: skip
 
     def recognition_gone(self, now: Seconds) -> None:
         """Start the grace after which the open events are lost: recognition may only be cut off."""
@@ -189,7 +190,7 @@ class Fragments:
         """Forget the body: another one may come."""
         self._body.capabilities = None
 
-    def _follow(self, progress: SyncPointProgress) -> None:
+    def _follow(self, progress: SyncPointProgress, now: Seconds) -> None:
         """Pass a sync point to its fragment, and tell the arbiter of its gazes when they really happen."""
         named = [each for each in self._live.values() if each.fragment.id == progress.block]
         if not named:
@@ -198,7 +199,7 @@ class Fragments:
         performance = min(named, key=lambda each: each.is_over)
         performance.feed(progress)
         if performance.signalled_end:
-            self._turns.turn_ended(performance.turn.turn)
+            self._turns.turn_ended(performance.turn.turn, now)
         self._follow_gaze(performance)
 
     def _follow_gaze(self, performance: FragmentPerformance) -> None:
@@ -234,6 +235,7 @@ class Fragments:
             self._events.lose()
         while (aborted := self._turns.tick(now)) is not None:
             self._abort(aborted, now)
+        self._hold_or_go_on()
         permits = self._leases.permits()
         for performance in list(self._live.values()):
             self._enforce_inhibitions(performance, permits)
@@ -245,8 +247,10 @@ class Fragments:
             elif outcome := performance.outcome(self._events, is_due=("undecided", performance.request.id) in due):
                 self._forget(performance)
                 self._outcomes.end(outcome, performance.turn, now)
-                heard = self._heard.of_turn(performance.turn.turn)
-                self._tell(AnswerRequest(replace(outcome, heard=heard)))
+                turn = performance.turn.turn
+                interjections = self._turns.interjections.of_turn(turn)
+                told = replace(outcome, heard=self._heard.of_turn(turn), interjections=interjections)
+                self._tell(AnswerRequest(told))
                 if not performance.turn.backchannel:  # that is said in the other's turn
                     self._heard.turn_ends(now)
         going = {each.turn.turn for each in self._live.values()} | {self._turns.open_turn}
@@ -254,10 +258,29 @@ class Fragments:
             self._tell(PublishMessage(keys.TURN_CLOSED, closed))
         self._events.forget({*going, *self._outcomes.turns})
         self._heard.forget({*going, *self._outcomes.turns})
+        self._turns.interjections.forget({*going, *self._outcomes.turns})
 
     def _forget(self, performance: FragmentPerformance) -> None:
         del self._live[performance.request.id]
         self._waits.clear(("undecided", performance.request.id))
+
+    def _hold_or_go_on(self) -> None:
+        """Hold what the robot says and does while it is undecided whether somebody interrupts it.
+
+        It waits at the next gap between two words. Then it goes on from there, or the turn has ended.
+        """
+        held = self._turns.held
+        for performance in self._live.values():
+            is_going_on = performance.is_sent and self._turns.goes_on(performance.fragment.id)
+            is_held = performance.turn.turn == held
+            if is_held and not performance.is_held and performance.turn.closes:
+                is_held = performance.words_left > LAST_WORDS
+            if is_going_on and is_held != performance.is_held:
+                performance.is_held = is_held
+                self._holds += 1
+                id = f"{performance.block_id}/hold-{self._holds}"
+                steer = SteerPerformance(id=id, to="hold" if is_held else "continue", block=performance.fragment.id)
+                self._tell(SendRequest(keys.BLOCK, steer))
 
     def _enforce_inhibitions(self, performance: FragmentPerformance, permits: Permits) -> None:
         block = performance.fragment.id

@@ -30,7 +30,7 @@ from engage_hri.schemas.fragments import (
 )
 from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions, Utterance
-from engage_hri.schemas.recognition import ConnectionEvent, Statistics, session_of
+from engage_hri.schemas.recognition import ConnectionEvent, Interjection, Statistics, session_of
 from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused, Unreadable, kind_of
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import COVERED_FOR, CoveredObjects, World
@@ -52,7 +52,7 @@ does. Ours."""
 
 Told = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | OngoingActions | World | RobotState | Statistics
-    | ConnectionEvent | Utterance | SyncPointProgress | WordSpoken | Unreadable | PeerAlive | PeerGone
+    | ConnectionEvent | Interjection | Utterance | SyncPointProgress | WordSpoken | Unreadable | PeerAlive | PeerGone
 )  # fmt: skip
 """Messages that generation takes into account, besides requests."""
 Asked = PerformFragment | Inhibit | SetCondition | Cancel
@@ -167,7 +167,7 @@ class GenerationIntake:
                     self._arbiter.feed(message, now)
             case RobotState() | Statistics():
                 self._arbiter.feed(message, now)
-            case Utterance() | SyncPointProgress() | WordSpoken():
+            case Interjection() | Utterance() | SyncPointProgress() | WordSpoken():
                 self._fragments.feed(message, now)
             case Unreadable(block=block, fault=fault):
                 self._warn(block, "PARSING_FAILURE", fault.within(block))
@@ -187,7 +187,8 @@ class GenerationIntake:
         for observation, _, _ in told:
             match observation:
                 case ActionBegan() | ActionEnded():
-                    self._fragments.feed(observation, self._now)
+                    if isinstance(observation, ActionEnded):
+                        self._fragments.feed(observation, self._now)
                     if observation.actor != self._robot:
                         self._arbiter.feed(observation, self._now)
                 case ActorFound() | ActorLost():

@@ -78,6 +78,8 @@ class FragmentPerformance:
         """True once it is not in line any more."""
         self.is_sent = False
         """True once the realizer has accepted the block of `plan`."""
+        self.is_held = False
+        """True while the block of `plan` waits, because somebody has spoken into it."""
         self.world: World | None = None
         """The world for which references were chosen, or found to be chosen still."""
         self.known: Mapping[str, Entity] = {}
@@ -155,6 +157,13 @@ class FragmentPerformance:
         """Take a word that the voice has said."""
         if self.plan is not None:
             self.acts[-1].heard[word.behavior] = word.position
+
+    @property
+    def words_left(self) -> int:
+        """Number of words of this block that the voice has not finished."""
+        speeches = [each for each in self._behaviors.values() if isinstance(each, Speech)]
+        heard = self.acts[-1].heard if self.acts else {}
+        return sum(len(each.text[heard.get(each.id, 0) :].split()) for each in speeches)
 
     @property
     def _reached(self) -> set[tuple[str, str]]:
@@ -246,6 +255,7 @@ class FragmentPerformance:
         self._warnings += [f"{id} was dropped" + (f": {reason}" if reason else "") for id, reason in told.items()]
         if rest is not None:
             self.left, self.turn_left, self.plan, self.is_sent = rest.fragment, rest.turn, None, False
+            self.is_held = False
             for object, reasons_why in rest.failed.items():
                 self.barred.setdefault(object, {}).update(reasons_why)
                 if self._tries >= MOST_TRIES:

@@ -32,9 +32,15 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import HeadOwner, PerformFragment, TurnFragment
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import ActionBegan
-from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn, TurnOutcome
+from engage_hri.schemas.recognition import (
+    ConnectionEvent,
+    Interjection,
+    InterjectionReading,
+    SignalTurn,
+    TurnOutcome,
+)
 from engage_hri.schemas.requests import Cancel
-from engage_hri.schemas.units import Vector
+from engage_hri.schemas.units import Stamp, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
@@ -195,6 +201,11 @@ class Partners:
         fields = {"kind": "directed_gaze", "initiator": "robot", "responder": "human", **fields}
         event = ConnectionEvent(id=id, state=state, at=now, started=now, **fields)
         self.bus.publish(keys.connection_event("human", event.kind), event)
+
+    def interjects(self, reading: InterjectionReading) -> None:
+        """Tell what the human says into the robot's turn, from 1.0 on."""
+        told = Interjection(actor="human", since=Stamp("loop", 1.0), at=self.bus.stamp(), reading=reading)
+        self.bus.publish(keys.interjection("human"), told)
 
     def speaks(self, actor: str) -> None:
         key = keys.ROBOT_ACTION if actor == "robot" else keys.PERCEIVED_ACTION

@@ -352,9 +352,10 @@ async def test_a_barge_in_interrupts_the_robot(hub: MemoryHub) -> None:
     async with stage(hub) as partners:
         pending = partners.send(says("a"))
         await partners.fragment_block("a")
-        partners.speaks("robot")
         await asyncio.sleep(1.0)
-        partners.speaks("human")
+        partners.interjects("open")
+        await asyncio.sleep(0.8)
+        partners.interjects("interruption")
         outcome = await pending.outcome
 
         assert isinstance(outcome, FragmentOutcome)

@@ -18,8 +18,8 @@ from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.requests.serving import GRACE
 from tests.generation.partners import TABLE, stage
 from tests.generation.test_service import refers, says
+from tests.generation.test_turn_endings import into
 from tests.generation.test_turn_policy import fragment
-from tests.generation.test_turn_policy import says as speaks
 from tests.standing_still import stand_still
 
 CONFIG = GenerationConfig(decision_patience=3.0)
@@ -28,7 +28,7 @@ SOON, TOO_LATE = 0.5 * LATE, 2.0 * LATE
 
 def silent(sight: Sight) -> TurnPolicy:
     """An open turn whose speaker has said nothing since 3.0; it has ten seconds, until 13.0."""
-    turns = TurnPolicy("robot", GenerationConfig(), sight)
+    turns = TurnPolicy(sight)
     turns.accept(fragment("a", "beginning"), "human", "manager", "1")
     turns.fragment_ended("a", complete=True, now=3.0)
     assert turns.tick(3.0) is None
@@ -78,7 +78,7 @@ def test_a_silence_is_a_speakers_unless_generation_stood_still_or_had_no_router(
 
 @pytest.mark.parametrize("is_back", [True, False])
 def test_a_person_who_came_back_while_generation_stood_still_has_not_left(is_back: bool) -> None:
-    turns = TurnPolicy("robot", GenerationConfig())
+    turns = TurnPolicy()
     turns.accept(fragment("a", "beginning"), "human", "manager", "1")
     turns.see([], 1.0)
     assert turns.tick(1.0) is None
@@ -91,15 +91,14 @@ def test_a_person_who_came_back_while_generation_stood_still_has_not_left(is_bac
 
 @pytest.mark.parametrize("has_ended", [True, False])
 def test_a_person_who_fell_silent_while_generation_stood_still_has_not_taken_the_floor(has_ended: bool) -> None:
-    turns = TurnPolicy("robot", GenerationConfig(barge_in=0.8))
+    turns = TurnPolicy(barge_in=0.8)
     turns.accept(fragment("a", "full"), "human", "manager", "1")
     turns.fragment_begins("a")
-    turns.feed(speaks("robot"), 1.0)
-    turns.feed(speaks("human"), 2.0)
+    turns.interject(into("open"), 2.0)
     assert turns.tick(2.0) is None
     assert turns.tick(5.0) is None
     if has_ended:
-        turns.feed(speaks("human", ends=True), 5.01)
+        turns.interject(into("backchannel"), 5.01)
 
     assert (turns.tick(5.0 + LATE) is None) == has_ended
 

@@ -276,23 +276,18 @@ async def test_a_barge_in_ends_all_of_the_turn_at_whatever_moment(stage: Robot, 
     assert "c:s:start" not in stage.reached
 
 
-async def test_who_speaks_while_the_robot_pauses_has_it_give_way_once_it_goes_on(stage: Robot) -> None:
+async def test_who_speaks_while_the_robot_pauses_takes_the_floor(stage: Robot) -> None:
     stage.send(says("a", "beginning"))
     await asyncio.sleep(1.5)
     stage.does("speak")
     await asyncio.sleep(3.0)
-    undisturbed = list(stage.closed)
-    stage.send(says("b", "end", "one two three four five six seven"))
-    await asyncio.sleep(2.0)
 
-    assert undisturbed == []
-    assert stage.outcomes["b"][1].status == "interrupted"
-    assert [closed.reason for _, closed in stage.closed] == ["human took the floor"]
+    assert [(round(at, 6), closed.reason) for at, closed in stage.closed] == [(2.3, "human took the floor")]
 
 
 async def test_an_answer_that_goes_on_into_the_next_turn_is_no_barge_in(stage: Robot) -> None:
     stage.send(says("a", "full"))
-    await asyncio.sleep(0.6)
+    await asyncio.sleep(0.8)  # within the last word
     stage.does("speak")
     await asyncio.sleep(2.0)
     stage.send(says("b", "full", "four five six seven eight nine ten"))

@@ -3,8 +3,10 @@
 import pytest
 
 from engage_hri.schemas.fragments import TurnStatus
+from engage_hri.schemas.recognition import Interjection, InterjectionReading
+from engage_hri.schemas.units import Stamp
 from engage_hri.services.generation.turns.policy import Aborted, TurnPolicy
-from tests.generation.test_turn_policy import fragment, policy, says
+from tests.generation.test_turn_policy import fragment, policy
 
 
 def told(aborted: Aborted | None) -> tuple[str, str, tuple[str, ...], str]:
@@ -66,7 +68,7 @@ def test_a_turn_is_aborted_aloud_if_it_had_begun_and_was_not_over(begins: bool, 
     if begins:
         turns.fragment_begins("a")
     if ends:
-        turns.turn_ended("a")
+        turns.turn_ended("a", 1.0)
 
     aborted = turns.fragment_ended("a", complete=False, now=1.0)
 
@@ -87,85 +89,108 @@ def test_a_turn_that_began_with_an_earlier_fragment_is_aborted_aloud() -> None:
     assert aborted.is_known
 
 
-# -- barge-in -----------------------------------------------------------------------------------------------------
+# -- what is said into the turn -----------------------------------------------------------------------------------
 
 
-def talked_into() -> TurnPolicy:
-    """The robot has said a sentence of two, the human began to speak 0.3 s before its end."""
-    turns = policy()
+def into(reading: InterjectionReading, actor: str = "human", since: float = 2.0) -> Interjection:
+    stamp = Stamp("test", since)
+    return Interjection(actor=actor, since=stamp, at=stamp, reading=reading, words="so it is")
+
+
+def speaking(barge_in: float | None = None) -> TurnPolicy:
+    """The robot says a sentence of two."""
+    turns = TurnPolicy(barge_in=barge_in)
     turns.accept(fragment("a", "beginning"), "human")
+    turns.fragment_begins("a")
     turns.accept(fragment("b", "end"), "")
-    turns.feed(says("robot"), 1.0)
-    turns.feed(says("human"), 2.0)
-    turns.feed(says("robot", ends=True), 2.3)
     return turns
 
 
-def test_a_barge_in_goes_on_into_the_next_sentence_of_the_turn() -> None:
-    turns = talked_into()
-    turns.feed(says("robot"), 2.3)
+def test_what_is_undecided_holds_the_turn_and_an_interruption_ends_it() -> None:
+    turns = speaking()
+    turns.interject(into("open"), 2.0)
+    before = turns.held
+    turns.interject(into("interruption"), 2.6)
 
-    assert turns.deadline == 2.8
-    assert told(turns.tick(2.8)) == ("a", "human", ("a", "b"), "human took the floor")
-
-
-def test_nobody_is_talked_into_between_two_sentences() -> None:
-    turns = talked_into()
-
-    assert turns.deadline is None
-    assert turns.tick(5.0) is None
+    assert before == "a"
+    assert told(turns.tick(2.6)) == ("a", "human", ("a", "b"), "human took the floor")
+    (kept,) = turns.interjections.of_turn("a")
+    assert (kept.actor, kept.reading, kept.words, kept.went_on) == ("human", "interruption", "so it is", False)
+    assert kept.held == pytest.approx(0.6)
 
 
-def test_who_begins_to_speak_between_two_sentences_is_heard_from_where_the_robot_goes_on() -> None:
-    turns = policy()
-    turns.accept(fragment("a", "beginning"), "human")
-    turns.feed(says("robot"), 1.0)
-    turns.feed(says("robot", ends=True), 2.0)
-    turns.feed(says("human"), 3.0)
-    turns.feed(says("robot"), 6.0)
+@pytest.mark.parametrize("reading", ["backchannel", "noise", "other", "answer"])
+def test_after_anything_else_the_turn_goes_on(reading: InterjectionReading) -> None:
+    turns = speaking()
+    turns.interject(into("open"), 2.0)
+    turns.interject(into(reading), 2.5)
 
-    assert turns.deadline == 6.8
-
-
-def test_who_spoke_before_the_robot_began_its_turn_is_not_interrupting_it() -> None:
-    turns = policy()
-    turns.feed(says("human"), 0.0)
-    turns.accept(fragment("a", "full"), "human")
-    turns.feed(says("robot"), 1.0)
-
-    assert turns.deadline is None
+    assert (turns.held, turns.tick(2.5), turns.deadline) == ("", None, None)
+    (kept,) = turns.interjections.of_turn("a")
+    assert (kept.reading, kept.held, kept.went_on) == (reading, 0.5, True)
 
 
-def test_an_answer_after_the_end_of_the_turn_does_not_count_against_the_next() -> None:
+def test_what_nobody_decides_holds_the_turn_for_three_seconds() -> None:
+    turns = speaking()
+    turns.interject(into("open"), 2.0)
+
+    assert turns.deadline == 5.0
+    assert (turns.tick(4.99), turns.held) == (None, "a")
+    assert (turns.tick(5.0), turns.held) == (None, "")
+    turns.interject(into("interruption"), 6.0)
+    assert turns.tick(6.0) is not None, "better late than never"
+
+
+def test_of_two_who_speak_both_have_to_be_decided() -> None:
+    turns = speaking()
+    turns.interject(into("open"), 2.0)
+    turns.interject(into("open", since=2.5), 2.5)
+    turns.interject(into("noise"), 2.5)
+    before = turns.held
+    turns.interject(into("backchannel", since=2.5), 3.0)
+
+    assert (before, turns.held) == ("a", "")
+
+
+def test_what_somebody_else_says_neither_holds_nor_ends_the_turn() -> None:
+    turns = speaking()
+    turns.interject(into("open", "passer-by"), 2.0)
+    turns.interject(into("interruption", "passer-by"), 2.8)
+
+    assert (turns.held, turns.tick(3.0)) == ("", None)
+    assert turns.interjections.of_turn("a") == ()
+
+
+def test_what_was_said_into_one_turn_does_not_cut_the_next() -> None:
     turns = policy()
     turns.accept(fragment("a", "full"), "human")
     turns.fragment_begins("a")
-    turns.feed(says("robot"), 1.0)
-    turns.feed(says("human"), 2.0)
-    turns.turn_ended("a")
+    turns.interject(into("open"), 2.0)
+    turns.turn_ended("a", 2.1)
     turns.accept(fragment("b", "full"), "human")
-    turns.feed(says("robot", ends=True), 2.1)
     turns.fragment_ended("a", complete=True, now=2.2)
-    turns.feed(says("robot"), 2.3)
+    turns.fragment_begins("b")
+    turns.interject(into("interruption"), 2.8)
 
-    assert turns.deadline is None
+    assert (turns.held, turns.tick(3.0)) == ("", None)
 
 
-def test_somebody_else_talking_does_not_hide_the_barge_in_of_who_is_spoken_to() -> None:
+@pytest.mark.parametrize("status", ["backchannel", "full"])
+def test_nobody_talks_into_a_backchannel_or_a_turn_that_has_not_begun(status: TurnStatus) -> None:
     turns = policy()
-    turns.accept(fragment("a", "full"), "alice")
-    turns.feed(says("robot"), 1.0)
-    turns.feed(says("bob"), 1.5)
-    turns.feed(says("alice"), 1.75)
-    turns.tick(2.3)
+    turns.accept(fragment("a", status), "human")
+    if status == "backchannel":
+        turns.fragment_begins("a")
+    turns.interject(into("open"), 1.1)
 
-    assert told(turns.tick(2.55)) == ("a", "alice", ("a",), "alice took the floor")
+    assert (turns.held, turns.tick(9.0)) == ("", None)
 
 
-def test_nobody_barges_into_a_backchannel() -> None:
-    turns = policy()
-    turns.accept(fragment("a", "backchannel"), "human")
-    turns.feed(says("robot"), 1.0)
-    turns.feed(says("human"), 1.1)
+@pytest.mark.parametrize("ends", [True, False])
+def test_a_voice_takes_the_floor_by_its_length_only_if_that_is_set(*, ends: bool) -> None:
+    turns = speaking(barge_in=0.5)
+    turns.interject(into("open"), 2.0)
+    if ends:
+        turns.interjections.falls_silent("human")
 
-    assert turns.tick(3.0) is None
+    assert (turns.tick(2.5) is None) == ends

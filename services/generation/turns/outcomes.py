@@ -13,6 +13,7 @@ from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.turns.interjections import Interjections
 from engage_hri.services.generation.turns.policy import Aborted, TurnPlan
 
 LOOKS_BACK: Seconds = 60.0
@@ -190,9 +191,17 @@ class _Record(Struct):
 class TurnOutcomes:
     """Outcomes of the robot's turns; backchannels have none. `deadline`: when to call `close_due` again."""
 
-    def __init__(self, events: TurnEvents, heard: HeardWords, config: GenerationConfig, sight: Sight) -> None:
+    def __init__(
+        self,
+        events: TurnEvents,
+        heard: HeardWords,
+        interjections: Interjections,
+        config: GenerationConfig,
+        sight: Sight,
+    ) -> None:
         self._events = events
         self._heard = heard
+        self._interjections = interjections
         self._config = config
         self._records: dict[str, _Record] = {}
         self._given_up = Silences[str](sight)
@@ -283,4 +292,5 @@ class TurnOutcomes:
             ),
             events=self._events.of_turn(turn),
             heard=self._heard.of_turn(turn),
+            interjections=self._interjections.of_turn(turn),
         )

@@ -17,18 +17,15 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
-from engage_hri.schemas.perception import ActionBegan, ActionEnded
+from engage_hri.schemas.recognition import Interjection
 from engage_hri.schemas.requests import are_of_one_run
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.deadlines import Sight, Silences
-from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.turns.interjections import UNDECIDED, Interjections
 from engage_hri.services.reports.action_reports import FACE_GRACE
-from engage_hri.services.text.listening import is_listening
 
 TURN_SILENCE: Seconds = 10.0
 """Silence after which an open turn closes as aborted. Recognition waits for its end for longer. Ours."""
-LONGEST_LISTENING: Seconds = 3.0
-"""Seconds of nothing but a listener's words, such as "yes, yes, okay", after which their speaker takes the floor."""
 
 
 class StatusRule(Struct, frozen=True):
@@ -98,12 +95,12 @@ def plan_turn(fragment: TurnFragment, turn: str, addressee: str) -> TurnPlan:
 class TurnPolicy:
     """The robot's turns, over streamed fragments. `deadline`: when to call `tick` at the latest."""
 
-    def __init__(self, robot: str, config: GenerationConfig, sight: Sight | None = None) -> None:
-        self._robot = robot
+    def __init__(self, sight: Sight | None = None, barge_in: Seconds | None = None) -> None:
+        """barge_in: `GenerationConfig.barge_in`."""
+        self._barge_in = barge_in
         self._sight = sight or Sight("generation")
         self._waits = Silences[tuple[str, str]](self._sight)
         """The `_limits`, since `tick` was called."""
-        self._config = config
         self._open: TurnPlan | None = None
         """The turn that the next fragment would continue."""
         self._speaker = self._life = ""
@@ -117,19 +114,11 @@ class TurnPolicy:
         self._delay_target = ""
         """The entity to look at after the last fragment, if that holds the turn."""
         self._silent_since: Seconds | None = None
-        self._robot_speaks = False
-        self._spoke_in = ""
-        """The turn of the robot's last words."""
         self._away: dict[str, Seconds] = {}
         """People who are out of sight, and since when."""
-        self._interrupters: dict[str, Seconds | None] = {}
-        """People who began to speak within the robot's turn, and since when the robot speaks, too."""
-        self._spoke_since: Seconds = 0.0
-        """Time when the robot first spoke in the turn of its last words."""
-        self._listeners: set[str] = set()
-        """Those of the interrupters who have said nothing but a listener's words so far."""
+        self.interjections = Interjections()
         self._taken_by = ""
-        """The person whose words have taken the floor; "": nobody's."""
+        """The person who has taken the floor; "": nobody has."""
 
     @property
     def open_turn(self) -> str:
@@ -198,11 +187,11 @@ class TurnPolicy:
         """Note that the block of a fragment of `turn` is on its way."""
         self._begun.setdefault(turn, False)
 
-    def turn_ended(self, turn: str) -> None:
+    def turn_ended(self, turn: str, now: Seconds) -> None:
         """Note that a turn is over: its end was signalled. Its last block may go on for a moment."""
         if turn in self._begun:
             self._begun[turn] = True
-            self._forget_interrupters()
+            self.interjections.turn_over(turn, now, went_on=True)
 
     def fragment_ended(self, id: str, *, complete: bool, now: Seconds, why: Fault = _COMPLETE) -> Aborted | None:
         """End a fragment. Its turn is aborted unless the block was performed completely. why: it was not."""
@@ -243,46 +232,22 @@ class TurnPolicy:
         """The entity at which the robot looks while its open turn pauses; "": it does not avert its gaze."""
         return self._delay_target if self._open is not None and not self._live else ""
 
-    def feed(self, message: ActionBegan | ActionEnded, now: Seconds) -> None:
-        """Note who speaks: an addressee who talks into the robot's turn for long takes it.
-
-        Between two of its utterances nobody takes it. Of a person who begins there the time counts from where the
-        robot goes on.
-        """
-        if message.action != "speak":
-            return
-        began, current = isinstance(message, ActionBegan), self._current
-        if message.actor == self._robot:
-            self._robot_speaks = began
-            if began and current is not None:
-                if self._spoke_in != current.turn:
-                    self._spoke_in, self._spoke_since = current.turn, now
-                since = {actor: now if at is None else at for actor, at in self._interrupters.items()}
-                self._interrupters.update(since)
-        elif not began:
-            self._interrupters.pop(message.actor, None)
-            self._listeners.discard(message.actor)
-        elif current is not None and current.addressee == message.actor and self._spoke_in == current.turn:
-            self._interrupters[message.actor] = now if self._robot_speaks else None
-
-    def hear(self, actor: str, text: str, *, began: Seconds, is_final: bool, is_line: bool) -> None:
-        """Note words of a person who speaks into the robot's turn: they decide before the seconds of voice do.
-
-        Final words that are more than a listener's take the floor at once, also where nobody tells of a voice; so
-        does a line that was typed, whatever it says. While the words are a listener's, partial ones included, nobody
-        takes it. Partial words of any other kind leave it to the voice, for they may be wrong.
-        """
+    def interject(self, told: Interjection, now: Seconds) -> None:
+        """Note what somebody says into the robot's turn, or that recognition has decided what it is."""
         current = self._current
-        if current is None or current.addressee != actor or self._spoke_in != current.turn or not text.strip():
-            return
-        if began < self._spoke_since:
-            return  # words from before the turn, which are known only now
-        if is_listening(text) and not is_line:
-            self._listeners.add(actor)
-            return
-        self._listeners.discard(actor)
-        if is_final:
-            self._taken_by = actor
+        is_let = current is not None and current.turn in self._begun and current.addressee == told.actor
+        if self.interjections.feed(told, current.turn if current is not None and is_let else "", now):
+            self._taken_by = told.actor
+
+    @property
+    def held(self) -> str:
+        """The turn that waits because it is undecided whether somebody interrupts it; "": none does."""
+        current = self._current
+        return current.turn if current is not None and self.interjections.waits_in(current.turn) else ""
+
+    def goes_on(self, fragment: str) -> bool:
+        """True if a fragment has neither ended nor is its turn broken off."""
+        return fragment in self._live
 
     def see(self, people: Collection[str], now: Seconds) -> None:
         """Note who is in sight."""
@@ -295,12 +260,13 @@ class TurnPolicy:
 
     @property
     def _limits(self) -> dict[tuple[str, str], Seconds]:
-        """Times until which others may go on as they do: be away or talk, by person, and be silent, by turn."""
-        limits = {}
-        for actor, began in self._interrupters.items() if self._robot_speaks and self._live else ():
-            if began is not None:  # talks into what the robot says now
-                patience = LONGEST_LISTENING if actor in self._listeners else self._config.barge_in
-                limits["talks", actor] = began + patience
+        """Times until which others may go on as they do: be away or undecided, by person, and be silent, by turn."""
+        turn = self._current.turn if self._current is not None else ""
+        waiting = self.interjections.waits_in(turn)
+        limits = {("undecided", actor): opened + UNDECIDED for actor, opened in waiting.items()}
+        if self._barge_in is not None:
+            voiced = self.interjections.voiced_in(turn)
+            limits |= {("talks", actor): opened + self._barge_in for actor, opened in voiced.items()}
         if self._silent_since is not None:
             limits["silent", self.open_turn] = self._silent_since + TURN_SILENCE
         people = {plan.addressee for plan in self._turns_under_way}
@@ -318,6 +284,9 @@ class TurnPolicy:
         for name, at in limits.items():
             self._waits.keep(name, at, now)
         why, who = self._waits.due(now) or ("", "")
+        while why == "undecided":
+            self.interjections.give_up(who, now)
+            why, who = self._waits.due(now) or ("", "")
         if why == "away":
             left = next(plan for plan in self._turns_under_way if plan.addressee == who)
             return self._abort(left, self._sight.fault(f"{who} has left", "", "gone", who, "", self._away[who]))
@@ -327,15 +296,12 @@ class TurnPolicy:
             silence = f"silence for {TURN_SILENCE:g} s"
             since, speaker = self._silent_since, self._speaker
             return self._abort(self._open, self._sight.fault(silence, "", "late", speaker, "", since))
-        if actor := self._taken_by or (who if why == "talks" else ""):
-            current = self._current
-            self._forget_interrupters()
-            taken = Fault(reason=f"{actor} took the floor", cause="cancelled", whose=actor)
-            return self._abort(current, taken) if current else None
+        if (actor := self._taken_by or (who if why == "talks" else "")) and (current := self._current) is not None:
+            return self._abort(current, Fault(reason=f"{actor} took the floor", cause="cancelled", whose=actor))
         return None
 
     def _abort(self, plan: TurnPlan, why: Fault) -> Aborted:
-        self._broken_off = why
+        self._broken_off, self._taken_by = why, ""
         if self._open is not None and self._open.turn == plan.turn:
             self._open = None
             self._silent_since = None
@@ -347,16 +313,11 @@ class TurnPolicy:
         return Aborted(plan.turn, plan.addressee, ended, why, is_known)
 
     def _forget(self) -> None:
-        """Drop what is known of turns that are over, and of the people who talked into them."""
+        """Drop what is known of turns that are over."""
         kept = {plan.turn for plan in self._live.values()} | {self.open_turn}
         self._begun = {turn: is_over for turn, is_over in self._begun.items() if turn in kept}
-        if self._current is None or self._current.turn != self._spoke_in:
-            self._forget_interrupters()
-
-    def _forget_interrupters(self) -> None:
-        self._interrupters.clear()
-        self._listeners.clear()
-        self._taken_by = ""
+        if self._current is None:
+            self._taken_by = ""
 
 
 def _refused(id: str, why: Fault) -> Fault:

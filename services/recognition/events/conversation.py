@@ -121,6 +121,8 @@ class Conversation:
         if self.robot_holds_floor and self._scene.lines.get(self.id) != at:
             self._signs("speak", at, confidence)
         else:
+            if self.robot_holds_floor:
+                self._writer.interject(self.id, at, "interruption", at)
             self._human_turn(at, "speak", confidence)
 
     def falls_silent(self, at: Seconds) -> None:

@@ -306,8 +306,8 @@ class Session:
         if words.to is not None:
             self.scene.tells_addressees = True
             self.scene.told_addressees[words.actor, words.since] = words.to
+        self.scene.worded.add(words.actor)
         if words.text:
-            self.scene.worded.add(words.actor)
             self._writer.understand(words.actor, words.since, words.text, at)
         if words.actor in self.persons:
             self._people.apply(

@@ -136,8 +136,8 @@ class Words:
         )  # fmt: skip
 
     def _told_early(self, person: _Person, words: TimedWords) -> Worded | None:
-        """Addressees that perception knows before it is sure of the words."""
-        speech = None if words.to is None else person.speech_with(words)
+        """News that words will come, and addressees that perception knows before it is sure of these."""
+        speech = person.speech_with(words)
         return None if speech is None else Worded(actor=words.actor, since=speech, text="", to=words.to)
 
     def speech(self, words: TimedWords) -> list[ActionBegan | ActionEnded]:

@@ -1,0 +1,101 @@
+"""People speak into the robot's turn at any instant: each outcome says who and what, and each word is said once."""
+
+import asyncio
+import random
+
+import pytest
+
+from engage_hri import perceive
+from engage_hri.schemas import keys
+from engage_hri.schemas.body import WordSpoken
+from engage_hri.schemas.fragments import FragmentOutcome
+from engage_hri.schemas.perception import Utterance
+from engage_hri.schemas.summary import summary
+from engage_hri.services.bus.memory import MemoryHub
+from tests.generation.test_talked_into import call, robot
+from tests.random_cases import share_of
+
+TEXT = "Number one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen and sixteen."
+WORD = 0.4
+"""Longest time that the robot goes on after words that stop it: the word that it is saying."""
+STOPPING = ("stop", "but what about the red one", "no not that")
+LISTENING = ("uh-huh", "yes yes okay", "ja genau")
+RECOGNIZING = 0.2
+ROUND = 1e-6
+
+
+async def interrupted(
+    hub: MemoryHub, *, words: str, after: float, seconds: float, known: bool, limit: float
+) -> tuple[FragmentOutcome, list[str], float]:
+    """What became of a turn, the words that were said aloud, and how long it went on after the words were known.
+
+    words: "": none come. known: a recognizer has told words of this person before.
+    """
+    said: list[str] = []
+    last = 0.0
+    async with (
+        robot(hub, f"recognition.backchannel_limit={limit}") as client,
+        perceive("ann", hub=hub) as ann,
+    ):
+        bus = hub.join("ear")
+        bus.declare_alive()
+        await ann.look_at(ann.robot)
+        if known:
+            await ann.say("good morning")
+        await asyncio.sleep(6.0)
+
+        async def listen() -> None:
+            nonlocal last
+            with bus.subscribe(keys.SYNC_POINT) as inbox:
+                async for received in inbox:
+                    if isinstance(received.message, WordSpoken):
+                        said.append(received.message.word)
+                        last = client.now()
+
+        listening = asyncio.create_task(listen())
+        performing = asyncio.create_task(client.perform(call(TEXT), await_answer=True))
+        await asyncio.sleep(after)
+        began = bus.stamp()
+        ann.begin("speak")
+        await asyncio.sleep(seconds)
+        ann.end("speak")
+        ended = bus.stamp()
+        await asyncio.sleep(RECOGNIZING)
+        decided = client.now()
+        if words:
+            uttered = Utterance(actor="ann", id="u", text=words, began=began, ended=ended, at=bus.stamp())
+            bus.publish(keys.UTTERANCE, uttered)
+        told = await performing
+        listening.cancel()
+    return told, said, last - decided
+
+
+@pytest.mark.parametrize("seed", range(share_of(200, 8)))
+async def test_each_outcome_says_who_and_what_and_each_word_is_said_once(hub: MemoryHub, seed: int) -> None:
+    chance = random.Random(seed)
+    words, known = chance.choice((*STOPPING, *LISTENING, "")), chance.random() < 0.6
+    after, seconds, limit = chance.uniform(0.6, 3.0), chance.uniform(0.2, 1.3), chance.uniform(0.3, 1.5)
+    told, said, went_on_for = await interrupted(
+        hub, words=words, after=after, seconds=seconds, known=known, limit=limit
+    )
+
+    all_words = TEXT.replace(".", "").split()
+    spoken = [each.strip(".") for each in said]
+    assert spoken == all_words[: len(spoken)], "each word once, and in order"
+    assert " ".join(each.text for each in told.spoken).replace(".", "").split() == spoken
+    [into] = told.interjections
+    assert into.actor == "ann"
+    is_by_words = known and words
+    if is_by_words:
+        assert into.reading == ("interruption" if words in STOPPING else "backchannel")
+        assert into.words == words
+    if known and not words:
+        assert into.reading == "noise"
+    assert into.reading in ("interruption", "backchannel", "noise")
+    assert into.went_on == (into.reading != "interruption")
+    assert told.status == ("done" if into.went_on else "interrupted")
+    assert (spoken == all_words) == into.went_on
+    if is_by_words and words in STOPPING:
+        assert went_on_for <= WORD + ROUND
+    [brief] = summary(told).interjections
+    assert (brief.who, brief.reading, brief.went_on) == ("ann", into.reading, into.went_on)
