@@ -73,7 +73,8 @@ class Recognition:
     def _tell(self, effects: list[Effect], now: Seconds) -> None:
         events = [effect for effect in effects if isinstance(effect, ConnectionEvent)]
         busy = self.session.busy
-        self.published.feed(events, busy, now, self.session.contacts())
+        contacts = {actor: much for actor, much in self.session.contacts().items() if much is not None}
+        self.published.feed(events, busy, now, contacts)
         if self.log is not None:
             self.log += events
 

@@ -2,8 +2,8 @@
 
 What is counted is cheap, a message of it is not, and people read numbers that change once a second at most. So `feed`
 counts, and `told` makes the messages that are due: at once if a level changes or somebody gets busy, or if nothing
-has been told of that actor for `TOLD_EVERY`; what changes sooner is told together when that time is over. Who needs the
-numbers of the end only, as after a replay, asks for them then (`overall`), and none are made before.
+has been told of that actor for `TOLD_EVERY`; what changes sooner is told together when that time is over. Who needs
+the numbers of the end only, as after a replay, asks for them then (`overall`), and none are made before.
 """
 
 from collections import defaultdict
