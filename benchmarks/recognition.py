@@ -7,8 +7,8 @@ robot with blocks, feedback and requests. It goes through session and statistics
 
 Seconds are those of the processor, so that others on the machine matter little.
 
-- speed: microseconds per observation, and as a multiple of one person's; beside the statistics alone, kept up
-  with each change and made anew from the log;
+- speed: microseconds per observation, and as a multiple of one person's, with statistics counted and made once at the
+  end, as in a replay; beside the statistics alone, kept up with each change and made anew from the log;
 - hour: how long an hour takes;
 - passers: thousands of people who come, look, speak and go, one after the other, told of and filmed: milliseconds a
   visit, and what is kept;
@@ -55,12 +55,15 @@ class Recognition:
         self.published = PublishedStatistics(ROBOT, RecognitionConfig())
         self.log: list[ConnectionEvent] | None = None
         """Fill it to keep the events."""
+        self.ended_at: Seconds = 0.0
 
     def run(self, observed: Iterable[tuple[Seconds, Observation]]) -> None:
         for at, observation in observed:
             while (due := self._deadline) is not None and due <= at:
                 self._tell(self.session.advance(due), due)
             self._tell(self.session.feed(observation, at), at)
+            self.ended_at = at
+        self.published.overall(self.ended_at)
 
     @property
     def _deadline(self) -> Seconds | None:
@@ -70,7 +73,8 @@ class Recognition:
     def _tell(self, effects: list[Effect], now: Seconds) -> None:
         events = [effect for effect in effects if isinstance(effect, ConnectionEvent)]
         busy = self.session.busy
-        self.published.feed(events, busy, now)
+        contacts = {actor: much for actor, much in self.session.contacts().items() if much is not None}
+        self.published.feed(events, busy, now, contacts)
         if self.log is not None:
             self.log += events
 
@@ -107,6 +111,7 @@ def statistics(observations: int) -> Rows:
     published = PublishedStatistics(ROBOT, config)
     for change in log:
         published.feed([change], set(), change.at.seconds)
+        published.told(change.at.seconds)
     kept_up = (process_time() - since) / len(log)
     sample = range(len(log) // 20, len(log), max(1, len(log) // 20))
     since = process_time()

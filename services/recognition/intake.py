@@ -259,7 +259,8 @@ class Intake:
             out.append(PublishMessage(keys.open_events(message.actor), message))
         counted = [change for change in changes if isinstance(change, PersonForgotten) or not change.retold]
         busy, contacts = self._recognizer.session.busy, self._recognizer.contacts()
-        for statistics in self._statistics.feed(counted, busy, self._now, contacts):
+        self._statistics.feed(counted, busy, self._now, contacts)
+        for statistics in self._statistics.told(self._now):
             if statistics.actor != "all":  # a person with this id would be taken for everybody
                 out.append(PublishMessage(keys.statistics(statistics.actor or "all"), statistics))
         if gone := [change.actor for change in changes if isinstance(change, PersonForgotten)]:

@@ -56,7 +56,8 @@ class Lobby:
             if isinstance(change, PersonForgotten):
                 self.reporters.forget(change.actor)
         self.book.feed(events, stamp(now))
-        self.published.feed(changes, self.recognizer.session.busy, now)
+        self.published.feed(changes, self.recognizer.session.busy, now, self.recognizer.contacts())
+        self.published.told(now)
         if self.keeps_events:
             self.events += events
 

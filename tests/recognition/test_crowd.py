@@ -131,7 +131,8 @@ def test_who_comes_back_later_is_somebody_new_and_the_totals_stay():
     log.found("ann", 700.0)
     log.looks("ann", ROBOT, 700.0)
     changes = [effect for effect in log.effects if isinstance(effect, ConnectionEvent | PersonForgotten)]
-    (first, everybody) = sorted(published.feed(changes, set(), 700.0), key=lambda one: one.session.events)
+    published.feed(changes, set(), 700.0)
+    (first, everybody) = sorted(published.told(700.0), key=lambda one: one.session.events)
 
     assert (first.actor, first.session.events) == ("ann", 1)
     assert (everybody.actor, everybody.session.events) == ("", 2)

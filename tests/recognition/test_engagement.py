@@ -37,8 +37,8 @@ class Told:
             self._feed([], self._published.deadline)
 
     def _feed(self, events: list[ConnectionEvent], now: Seconds) -> None:
-        told = self._published.feed(events, self._busy, now)
-        self.messages += [statistics for statistics in told if statistics.actor == self._actor]
+        self._published.feed(events, self._busy, now)
+        self.messages += [statistics for statistics in self._published.told(now) if statistics.actor == self._actor]
 
     @property
     def levels(self) -> list[tuple[float, str]]:

@@ -49,6 +49,7 @@ def test_a_long_session_keeps_no_more_than_a_short_one():
         effects = session.feed(observation, at)
         busy = session.busy
         published.feed([effect for effect in effects if isinstance(effect, ConnectionEvent)], busy, now)
+        published.told(now)
         if number in (EARLY, LATE):
             sizes.append(kinds(session, published))
     early, late = sizes

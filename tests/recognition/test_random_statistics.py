@@ -1,7 +1,9 @@
 """Statistics and engagement of random streams equal what their definitions give of the log, at every moment."""
 
 from collections.abc import Iterator
+from unittest import mock
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -10,12 +12,21 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import Effect
 from engage_hri.services.recognition.events.session import Session
+from engage_hri.services.recognition.statistics import published
 from engage_hri.services.recognition.statistics.engagement import JUST_AFTER, next_level
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from tests.random_cases import share_of
 from tests.recognition import recomputed
 from tests.recognition.observations import ROBOT, world
 from tests.recognition.test_random_streams import ACTORS, Stream, streams
+
+
+@pytest.fixture(autouse=True, scope="module")
+def each_change_at_once() -> Iterator[None]:
+    """The definitions say what holds at each moment; the service tells it a little later."""
+    with mock.patch.object(published, "TOLD_EVERY", 0.0):
+        yield
+
 
 CONFIG = RecognitionConfig(window=5.0, reference_mtbce=0.8)
 """A window that random streams outlast, and a pace that they fall short of."""
@@ -56,7 +67,8 @@ class Replay:
         events = [effect for effect in effects if isinstance(effect, ConnectionEvent) and not effect.retold]
         self.log += events
         self.busy = set(self._session.busy)
-        told = self._published.feed(events, self.busy, self._now)
+        self._published.feed(events, self.busy, self._now)
+        told = self._published.told(self._now)
         self.told.update((statistics.actor, statistics) for statistics in told)
         return told
 
@@ -132,7 +144,8 @@ def test_statistics_do_not_depend_on_how_changes_are_grouped(stream, size):
     told: dict[str, Statistics] = {}
     end = max((change.at.seconds for change in replay.log), default=0.0)
     for first in range(0, len(replay.log), size):
-        for statistics in together.feed(replay.log[first : first + size], set(), end):
+        together.feed(replay.log[first : first + size], set(), end)
+        for statistics in together.told(end):
             told[statistics.actor] = statistics
 
     assert all(recomputed.alike(told[actor].session, replay.told[actor].session) for actor in told)

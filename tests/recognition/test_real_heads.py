@@ -55,7 +55,8 @@ def estimates(name: str) -> dict[str, list[float]]:
 
     def take(results: list[object], now: float) -> None:
         changes = [each for each in results if isinstance(each, ConnectionEvent)]
-        for each in published.feed(changes, set(), now, recognizer.contacts()):
+        published.feed(changes, set(), now, recognizer.contacts())
+        for each in published.told(now):
             if each.actor and each.engagement is not None:
                 last[each.actor] = each.engagement
         for person, value in last.items():

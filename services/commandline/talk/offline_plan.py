@@ -46,7 +46,7 @@ async def _generated(things: Sequence[Thing], world: World, config: RobotConfig,
     body = made(config.control)
     calibration = calibrated(body, config.control.calibration)
     permits = Leases(config.generation).permits()
-    turns = TurnPolicy(config.robot, config.generation)
+    turns = TurnPolicy()
 
     def estimated(items: Sequence[EstimateItem]) -> Sequence[Estimate]:
         return [calibration.stated(estimate) for estimate in body.rehearse(items, world)]

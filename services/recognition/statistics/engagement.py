@@ -94,11 +94,15 @@ class Engagement:
         self.busy = busy
         return self.estimate
 
-    def changes(self, now: Seconds) -> bool:
-        """True if the level, or by contact the value, is another now than it was told."""
-        estimate, told = self._estimate(now), self.estimate.value
-        drifts = self.contact.now is not None and abs((estimate.value or 0.0) - (told or 0.0)) >= TOLD_AGAIN
-        return not self.busy and (drifts or estimate.level != self.estimate.level)
+    def level_changes(self, now: Seconds) -> bool:
+        """True if the level is another now than it was told."""
+        return not self.busy and self._estimate(now).level != self.estimate.level
+
+    def drifts(self, now: Seconds) -> bool:
+        """True if by contact alone the value is another now than it was told."""
+        if self.busy or self.contact.now is None:
+            return False
+        return abs((self._estimate(now).value or 0.0) - (self.estimate.value or 0.0)) >= TOLD_AGAIN
 
     def _estimate(self, now: Seconds) -> EngagementEstimate:
         known: list[Probability] = []
@@ -118,8 +122,9 @@ class Engagement:
     def _pace(self, now: Seconds) -> tuple[Probability, tuple[str, str]]:
         """Pace times quality, and why."""
         usual, silent = self._usual, self._silence(now)
-        recent = self._tally.recent_mean(now) if now >= self._recent_from else None
-        failed, judged = self._tally.judged(now)
+        window = self._tally.pace(now)
+        recent = window.mean if now >= self._recent_from else None
+        failed, judged = window.failed, window.judged
         speed, good = pace(usual, recent, silent), quality(failed, judged)
         between = f"{recent:.1f} s between recent events" if recent is not None else "no recent pace"
         return speed * good, (
@@ -169,7 +174,8 @@ class Engagement:
         """Time at which silence alone has passed the next threshold, where pace is all that is known."""
         level = self.estimate.level
         threshold = (self._config.engaged_from if level == "engaged" else self._config.disengaged_below) - HYSTERESIS
-        good = quality(*self._tally.judged(now))
+        window = self._tally.pace(now)
+        good = quality(window.failed, window.judged)
         if level == "disengaged" or threshold <= 0.0 or good <= threshold:
             return []
         return [now - self._silence(now) + self._usual * good / threshold + JUST_AFTER]

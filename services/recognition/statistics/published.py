@@ -1,8 +1,15 @@
-"""Statistics messages of each person and of all together: made anew whenever something in them changes."""
+"""Statistics of each person and of all together: counted as events come, made when somebody reads them.
+
+What is counted is cheap, a message of it is not, and people read numbers that change once a second at most. So `feed`
+counts, and `told` makes the messages that are due: at once if a level changes or somebody gets busy, or if nothing
+has been told of that actor for `TOLD_EVERY`; what changes sooner is told together when that time is over. Who needs
+the numbers of the end only, as after a replay, asks for them then (`overall`), and none are made before.
+"""
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Set
 from functools import partial
+from math import inf
 
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Probability, Seconds, Stamp
@@ -13,6 +20,8 @@ from engage_hri.services.recognition.statistics.engagement import Engagement
 from engage_hri.services.recognition.statistics.tally import EventTally
 
 EVERYBODY = ""
+TOLD_EVERY: Seconds = 1.0
+"""Least time between two messages of one actor, unless the level changes or somebody gets busy. Decision 0182."""
 
 
 class _ActorStatistics:
@@ -21,11 +30,26 @@ class _ActorStatistics:
     def __init__(self, config: RecognitionConfig, clock: str) -> None:
         self.tally = EventTally(config.window, clock)
         self.engagement = Engagement(config, self.tally)
+        self.told_at: Seconds = -inf
+        self.is_new = False
+        """True if something has changed since it was told."""
+        self.is_urgent = False
+        """True if that is to be told at once."""
+        self.leaves: Seconds = inf
+        """Time at which the next event leaves the recent window that was told."""
 
-    def changes(self, now: Seconds) -> bool:
-        """True if an event leaves the recent window now, or the level changes."""
-        leaves = self.tally.next_change is not None and self.tally.next_change <= now
-        return leaves or self.engagement.changes(now)
+    def look(self, now: Seconds) -> None:
+        """Take what changes by the passing of time."""
+        self.is_new = self.is_new or self.leaves <= now or self.engagement.drifts(now)
+        self.is_urgent = self.is_urgent or self.engagement.level_changes(now)
+
+    def is_due(self, now: Seconds) -> bool:
+        return self.is_urgent or (self.is_new and now >= self.told_at + TOLD_EVERY)
+
+    def next_look(self, now: Seconds) -> Seconds | None:
+        """Time at which it next changes by itself, or what has changed is to be told."""
+        changes = [self.told_at + TOLD_EVERY if self.is_new else self.leaves, self.engagement.next_change(now)]
+        return min((at for at in changes if at is not None and at < inf), default=None)
 
 
 class PublishedStatistics:
@@ -35,12 +59,14 @@ class PublishedStatistics:
         self._robot = robot
         self._clock = clock
         self._actors = defaultdict[str, _ActorStatistics](partial(_ActorStatistics, config, clock))
+        self._changed: set[str] = set()
+        """Actors of whom something has come in since `told` was last called."""
         self._agenda: Deadlines[str] = Deadlines(str)
         self._busy: frozenset[str] = frozenset()
 
     @property
     def deadline(self) -> Seconds | None:
-        """Time at which statistics of an actor next change by the passing of time."""
+        """Time at which `told` has something to do, though nothing has come in."""
         return self._agenda.earliest
 
     def feed(
@@ -49,34 +75,54 @@ class PublishedStatistics:
         busy: Set[str],
         now: Seconds,
         contacts: Mapping[str, Probability] = {},
-    ) -> list[Statistics]:
-        """Count changes, in their order. Returns the statistics that are new.
+    ) -> None:
+        """Count changes, in their order.
 
-        busy: persons with a task in hand. contacts: how much of a contact there is now, where that has changed.
+        busy: persons with a task in hand. contacts: how much of a contact there is now, where that may have changed.
         """
-        due, touched = set(iter(lambda: self._agenda.due(now), None)), set[str]()
         for actor, much in contacts.items():
             if self._actors[actor].engagement.contact.now != much:
                 self._actors[actor].engagement.touch(much, now)
-                due.add(actor)
+                self._changed.add(actor)
         for change in changes:
             if isinstance(change, PersonForgotten):
                 self._actors.pop(change.actor, None)
                 self._agenda.clear(change.actor)
-                touched.discard(change.actor)
-                due.discard(change.actor)
+                self._changed.discard(change.actor)
                 continue
             for name in (change.person(self._robot), EVERYBODY):
-                self._actors[name].tally.feed(change)
-                touched.add(name)
+                one = self._actors[name]
+                one.tally.feed(change)
+                one.is_new = True
+                self._changed.add(name)
         if busy != self._busy:
-            touched |= {EVERYBODY, *(busy ^ self._busy)}
-            self._busy = frozenset(busy)
-        # What changes by the passing of time is told if it changes the level, or leaves the recent window.
-        touched |= {actor for actor in due if actor in self._actors and self._actors[actor].changes(now)}
-        for actor in due - touched:
-            self._set_alarm(actor, now)
-        return [self._statistics(actor, now) for actor in sorted(touched)]
+            self._get_busy(frozenset(busy), now)
+
+    def _get_busy(self, busy: frozenset[str], now: Seconds) -> None:
+        """Freeze the estimate of who has got busy, and of all, as it is now; or let it go."""
+        changed, self._busy = {EVERYBODY, *(busy ^ self._busy)}, busy
+        for actor in changed:
+            self._actors[actor].engagement.update(now, busy=self._is_busy(actor))
+            self._actors[actor].is_urgent = True
+        self._changed |= changed
+
+    def _is_busy(self, actor: str) -> bool:
+        return bool(self._busy) if actor == EVERYBODY else actor in self._busy
+
+    def told(self, now: Seconds) -> list[Statistics]:
+        """Make the statistics that are to be told by now."""
+        due = set(iter(lambda: self._agenda.due(now), None))
+        looked_at, self._changed = due | self._changed, set()
+        told = []
+        for actor in sorted(looked_at):
+            one = self._actors[actor]
+            one.look(now)
+            if one.is_due(now):
+                told.append(self._statistics(actor, now))
+                one.told_at, one.is_new, one.is_urgent = now, False, False
+                one.leaves = inf if (leaves := one.tally.next_change(now)) is None else leaves
+            self._agenda.set(actor, one.next_look(now))
+        return told
 
     def overall(self, now: Seconds) -> Statistics:
         """Statistics of all together, as they are."""
@@ -84,16 +130,9 @@ class PublishedStatistics:
 
     def _statistics(self, actor: str, now: Seconds) -> Statistics:
         one = self._actors[actor]
-        busy = bool(self._busy) if actor == EVERYBODY else actor in self._busy
+        busy = self._is_busy(actor)
         estimate = one.engagement.update(now, busy=busy)
-        statistics = Statistics(
+        return Statistics(
             actor=actor, at=Stamp(self._clock, now), session=one.tally.session(), recent=one.tally.recent(now),
             engagement=estimate.value, level=estimate.level, reasons=estimate.reasons, busy=busy,
         )  # fmt: skip
-        self._set_alarm(actor, now)
-        return statistics
-
-    def _set_alarm(self, actor: str, now: Seconds) -> None:
-        one = self._actors[actor]
-        changes = (one.tally.next_change, one.engagement.next_change(now))
-        self._agenda.set(actor, min((at for at in changes if at is not None), default=None))

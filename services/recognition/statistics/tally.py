@@ -3,12 +3,15 @@
 The time between events is the difference of successive *starts*, of all kinds and both initiators, failures
 included. Starts may become known late (a backchannel shows only at its end), so recent ones are kept sorted and
 gaps are final only after `SETTLED`. Memory is bounded by the events of that time and of the recent window.
+
+A change is only counted when it comes. What follows from the counts is made when somebody reads it, and so is all
+that is told of the recent window: of each event in it only the last change is kept.
 """
 
-from bisect import bisect_left, bisect_right, insort
+from bisect import bisect_left, insort
 from collections.abc import Iterable, Sequence
 from operator import sub
-from typing import get_args
+from typing import NamedTuple, get_args
 
 from msgspec import Struct, field
 
@@ -32,8 +35,10 @@ class Spread(Struct):
     def add(self, delay: Seconds) -> None:
         self.number += 1
         self.sum += delay
-        self.least = delay if self.least is None else min(self.least, delay)
-        self.greatest = delay if self.greatest is None else max(self.greatest, delay)
+        if self.least is None or delay < self.least:
+            self.least = delay
+        if self.greatest is None or delay > self.greatest:
+            self.greatest = delay
 
     @property
     def mean(self) -> Seconds | None:
@@ -41,12 +46,11 @@ class Spread(Struct):
 
 
 class Count(Struct):
-    """Count of one kind of event. failed: without the optional ones. judged: successes and failures without those."""
+    """Count of one kind of event. failed: without the optional ones."""
 
     count: int = 0
     succeeded: int = 0
     failed: int = 0
-    judged: int = 0
     delays: Spread = field(default_factory=Spread)
     failed_delays: Spread = field(default_factory=Spread)
     error: Seconds = 0.0
@@ -56,15 +60,16 @@ class Count(Struct):
         """Count a success or a failure; nothing else changes the rates."""
         if event.state == "succeeded":
             self.succeeded += 1
-            self.judged += not event.optional
-            if event.delay is not None:
-                self.delays.add(event.delay)
-                self.error = max(self.error, event.delay_error or 0.0)
+            if event.delay is None:
+                return
+            self.delays.add(event.delay)
         elif event.state == "failed" and not event.optional:
             self.failed += 1
-            self.judged += 1
             self.failed_delays.add(event.delay or 0.0)
-            self.error = max(self.error, event.delay_error or 0.0)
+        else:
+            return
+        if event.delay_error is not None and event.delay_error > self.error:
+            self.error = event.delay_error
 
     def statistics(self, kind: EventKind) -> KindStatistics:
         delays, failed_delays, decided = self.delays, self.failed_delays, self.succeeded + self.failed
@@ -77,19 +82,8 @@ class Count(Struct):
         )  # fmt: skip
 
 
-def _counted(events: Iterable[ConnectionEvent]) -> Count:
-    count = Count()
-    for event in events:
-        count.count += 1
-        count.decide(event)
-    return count
-
-
 class Starts:
-    """Starts of connection events, in order: their number, mean and largest difference.
-
-    A session settles old starts, the recent window forgets them.
-    """
+    """Starts of connection events, in order: their number, mean and largest difference."""
 
     def __init__(self) -> None:
         self._kept: list[Seconds] = []
@@ -98,22 +92,20 @@ class Starts:
         self._first: Seconds = float("inf")
         """Earliest of the settled starts."""
         self._largest_settled: Seconds = float("-inf")
-        self._largest: Seconds | None = None
-        """Largest difference; None if outdated."""
 
     def add(self, start: Seconds) -> None:
         kept = self._kept
-        if self._settled and start < kept[0]:
+        if not kept or start >= kept[-1]:
+            kept.append(start)
+            if kept[0] < start - 2 * SETTLED:  # now and then, and not at each start
+                self._settle(start - SETTLED)
+        elif self._settled and start < kept[0]:
             self._settled += 1
             self._first = min(self._first, start)
-            return
-        if self._largest is not None and start >= kept[-1]:
-            self._largest = max(self._largest, start - kept[-1])
         else:
-            self._largest = None
-        insort(kept, start)
+            insort(kept, start)
 
-    def settle(self, horizon: Seconds) -> None:
+    def _settle(self, horizon: Seconds) -> None:
         """Summarize the starts before `horizon`. The last of them is kept, for the next difference."""
         settled = bisect_left(self._kept, horizon) - 1
         if settled > 0:
@@ -121,12 +113,6 @@ class Starts:
             self._largest_settled = max(self._largest_settled, *_differences(self._kept[: settled + 1]))
             self._settled += settled
             del self._kept[:settled]
-
-    def forget(self, number: int) -> None:
-        """Drop the oldest `number` starts."""
-        if number:
-            del self._kept[:number]
-            self._largest = None
 
     @property
     def count(self) -> int:
@@ -144,11 +130,7 @@ class Starts:
 
     @property
     def largest_difference(self) -> Seconds | None:
-        if self.count < 2:
-            return None
-        if self._largest is None:
-            self._largest = max(self._largest_settled, *_differences(self._kept))
-        return self._largest
+        return None if self.count < 2 else max(self._largest_settled, *_differences(self._kept))
 
 
 def _differences(starts: Sequence[Seconds]) -> list[Seconds]:
@@ -165,10 +147,11 @@ class _Window:
         """Starts without the glances that the maintenance policy caused."""
 
     def begin(self, event: ConnectionEvent) -> None:
+        start = event.started.seconds
         self.counts[event.kind].count += 1
-        self.starts.add(event.started.seconds)
-        if _is_own(event):
-            self.own_starts.add(event.started.seconds)
+        self.starts.add(start)
+        if event.cause != "maintenance":
+            self.own_starts.add(start)
 
     def statistics(self, clock: str) -> WindowStatistics:
         starts, own = self.starts, self.own_starts
@@ -181,12 +164,21 @@ class _Window:
         )  # fmt: skip
 
 
-def _is_own(event: ConnectionEvent) -> bool:
-    return event.cause != "maintenance"
+class RecentPace(NamedTuple):
+    """Pace of the recent window, for engagement."""
 
+    first: Seconds | None = None
+    last: Seconds | None = None
+    events: int = 0
+    failed: int = 0
+    judged: int = 0
 
-def _order(event: ConnectionEvent) -> tuple[Seconds, str]:
-    return event.started.seconds, event.id
+    @property
+    def mean(self) -> Seconds | None:
+        """Mean time between the events."""
+        if self.first is None or self.last is None or self.events < 2:
+            return None
+        return (self.last - self.first) / (self.events - 1)
 
 
 class EventTally:
@@ -199,79 +191,66 @@ class EventTally:
         self._length = window
         self._clock = clock
         self._session = _Window()
-        self._recent = _Window()
-        self._recent_events: dict[EventKind, list[ConnectionEvent]] = {kind: [] for kind in KINDS}
-        """Events of the recent window, in the order of their starts: each as started, or as decided."""
-        self._open: set[str] = set()
-        self._decided: set[str] = set()
+        self._recent: dict[str, ConnectionEvent] = {}
+        """Events of the recent window, and some that have left it, by id: each as started, or as decided."""
+        self._open: dict[str, bool] = {}
+        """Events that have not ended, by id; whether they are decided."""
 
     def feed(self, event: ConnectionEvent) -> None:
         """Count one change of an event. Repeated and unknown ones change nothing."""
-        if event.state == "started":
-            if event.id in self._open:
-                return
-            self._open.add(event.id)
-            self._session.begin(event)
-            self._recent.begin(event)
-            insort(self._recent_events[event.kind], event, key=_order)
-            for starts in (self._session.starts, self._session.own_starts):
-                starts.settle(event.started.seconds - SETTLED)
-        elif event.id in self._open:
-            if event.id not in self._decided and event.state != "completed":
-                self._decided.add(event.id)
-                self._decide(event)
-            if event.state in ENDINGS:
-                self._open.discard(event.id)
-                self._decided.discard(event.id)
+        id, state = event.id, event.state
+        if state == "started":
+            if id not in self._open:
+                self._open[id] = False
+                self._session.begin(event)
+                self._forget(event.at.seconds)
+                self._recent[id] = event
+        elif (is_decided := self._open.get(id)) is not None:
+            if not is_decided and state != "completed":
+                self._open[id] = True
+                self._session.counts[event.kind].decide(event)
+                if id in self._recent:
+                    self._recent[id] = event
+            if state in ENDINGS:
+                del self._open[id]
 
-    def _decide(self, event: ConnectionEvent) -> None:
-        self._session.counts[event.kind].decide(event)
-        events = self._recent_events[event.kind]
-        index = bisect_left(events, _order(event), key=_order)
-        if index < len(events) and events[index].id == event.id:
-            events[index] = event
-            self._recent.counts[event.kind].decide(event)
+    def _forget(self, now: Seconds) -> None:
+        """Drop what has left the recent window, up to the first that has not: few are known out of order."""
+        while self._recent:
+            id, event = next(iter(self._recent.items()))
+            if event.started.seconds + self._length > now:
+                return
+            del self._recent[id]
+
+    def _window(self, now: Seconds) -> Iterable[ConnectionEvent]:
+        length = self._length
+        return [event for event in self._recent.values() if event.started.seconds + length > now]
 
     @property
     def starts(self) -> Starts:
         """Starts of the session."""
         return self._session.starts
 
-    @property
-    def next_change(self) -> Seconds | None:
-        """Time at which the oldest event leaves the recent window."""
-        return min((self._leaves(events[0]) for events in self._recent_events.values() if events), default=None)
-
-    def _leaves(self, event: ConnectionEvent) -> Seconds:
-        return event.started.seconds + self._length
-
-    def forget(self, now: Seconds) -> None:
-        """Drop what has left the recent window."""
-        for kind, events in self._recent_events.items():
-            if events and self._leaves(events[0]) <= now:
-                gone = events[: bisect_right(events, now, key=self._leaves)]
-                del events[: len(gone)]
-                self._recent.counts[kind] = _counted(events)
-                self._recent.starts.forget(len(gone))
-                self._recent.own_starts.forget(sum(map(_is_own, gone)))
+    def next_change(self, now: Seconds) -> Seconds | None:
+        """Time after `now` at which the next event leaves the recent window."""
+        first = self.pace(now).first
+        return None if first is None else first + self._length
 
     def session(self) -> WindowStatistics:
         return self._session.statistics(self._clock)
 
     def recent(self, now: Seconds) -> WindowStatistics:
-        self.forget(now)
-        return self._recent.statistics(self._clock)
+        window = _Window()
+        for event in self._window(now):
+            window.begin(event)
+            window.counts[event.kind].decide(event)
+        return window.statistics(self._clock)
 
-    def recent_mean(self, now: Seconds) -> Seconds | None:
-        """Mean time between the events of the recent window."""
-        self.forget(now)
-        return self._recent.starts.mean_difference
-
-    def judged(self, now: Seconds) -> tuple[int, int]:
-        """Number of recent failures, and of recent decisions that count for engagement.
-
-        Optional events do not count, nor those preempted, withdrawn or superseded.
-        """
-        self.forget(now)
-        counts = self._recent.counts.values()
-        return sum(count.failed for count in counts), sum(count.judged for count in counts)
+    def pace(self, now: Seconds) -> RecentPace:
+        """Pace and failures of the recent window. Preempted, withdrawn and superseded events are not judged."""
+        events = self._window(now)
+        starts = [event.started.seconds for event in events]
+        if not starts:
+            return RecentPace()
+        judged = [event.state for event in events if not event.optional and event.state in ("succeeded", "failed")]
+        return RecentPace(min(starts), max(starts), len(starts), judged.count("failed"), len(judged))
