@@ -235,7 +235,7 @@ def each_request_ends_once(again: Again) -> None:
 
 async def test_all_that_can_happen_to_a_fragment_happens(hub: MemoryHub) -> None:
     """The sessions above would prove little if they were quiet."""
-    record = await recorded(hub, 3, lives=2)
+    record = await recorded(hub, 8, lives=2)
     took, did, ends, sent = Counter[str](), Counter[str](), Counter[str](), Counter[type]()
     for session in record.lives:
         steps = [step for taken in record.lives[session] for step in taken.steps]
