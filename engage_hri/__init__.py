@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from engage_hri.schemas.fragments import TurnFragment as TurnFragment
     from engage_hri.schemas.perception import Utterance as Utterance
     from engage_hri.schemas.recognition import ConnectionEvent as ConnectionEvent
+    from engage_hri.schemas.recognition import Floor as Floor
+    from engage_hri.schemas.recognition import Interjection as Interjection
     from engage_hri.schemas.recognition import Statistics as Statistics
     from engage_hri.schemas.summary import Summary as Summary
     from engage_hri.schemas.summary import summary as summary
@@ -68,7 +70,7 @@ _PLACES = {
     "engage_hri.schemas.faults": ("EngageError", "Fault", "InputRefused", "RequestRefused", "RunFailed"),
     "engage_hri.schemas.fragments": ("FragmentOutcome", "TurnFragment"),
     "engage_hri.schemas.perception": ("Utterance",),
-    "engage_hri.schemas.recognition": ("ConnectionEvent", "Statistics"),
+    "engage_hri.schemas.recognition": ("ConnectionEvent", "Floor", "Interjection", "Statistics"),
     "engage_hri.schemas.summary": ("Summary", "summary"),
     "engage_hri.schemas.tool": ("tool_definition",),
     "engage_hri.schemas.world": ("Entity", "World"),
@@ -98,10 +100,12 @@ __all__ = [
     "EngageError",
     "Entity",
     "Fault",
+    "Floor",
     "FragmentOutcome",
     "Gaze",
     "Head",
     "InputRefused",
+    "Interjection",
     "JointLimit",
     "MovementAuthority",
     "OrdinaryBody",

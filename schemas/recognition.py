@@ -125,9 +125,9 @@ class FloorSpeech(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class Floor(Struct, frozen=True, kw_only=True, tag="floor", omit_defaults=True):
-    """state: recognition. Who has the floor: all speeches that go on, the first first; the others overlap it.
+    """state: recognition. Who has the floor.
 
-    at: the instant of the last change.
+    at: the instant of the last change. speeches: all that go on, the first first; the others overlap it.
     """
 
     at: Stamp

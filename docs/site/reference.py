@@ -28,7 +28,9 @@ SECTIONS = {
     "Driving a robot": ("connect", "embedded", "Robot"),
     "What you give it": ("TurnFragment", "Reference", "SpeechOption", "Speech", "Gaze", "Pointing", "Head", "Block"),
     "Telling of people": ("perceive", "PerceivedPerson", "Utterance"),
-    "What comes back": ("FragmentOutcome", "ConnectionEvent", "Statistics", "World", "Entity"),
+    "What comes back": (
+        "FragmentOutcome", "ConnectionEvent", "Statistics", "Floor", "Interjection", "World", "Entity",
+    ),
     "Language models": ("perform_call", "stream", "tool_definition", "summary", "Summary"),
     "Writing a body": (
         "SetPointBody", "SimulatedServos", "OrdinaryBody", "Body", "MovementAuthority", "Arrived", "Reached",

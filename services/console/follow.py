@@ -27,6 +27,8 @@ FOLLOWED = (
     keys.ANY_CONNECTION_EVENT,
     keys.ANY_OPEN_EVENTS,
     keys.ANY_STATISTICS,
+    keys.ANY_INTERJECTION,
+    keys.FLOOR,
     keys.HEAD_OWNER,
     keys.HELD,
     keys.BODY_HELD,

@@ -12,7 +12,7 @@ from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.behavior_types import TYPES, dialect_sync, same_instant
 from engage_hri.schemas.blocks import Block, Hold, WarningFeedback
 from engage_hri.schemas.fragments import Claim, TurnFragment
-from engage_hri.schemas.recognition import ConnectionEvent, Statistics
+from engage_hri.schemas.recognition import ConnectionEvent, Floor, Interjection, InterjectionReading, Statistics
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.vocabulary import normal
@@ -85,6 +85,34 @@ def _give_or_take(error: Seconds | None) -> str:
     if error is None:
         return " (clocks not measured yet)"
     return f" ± {seconds(error)}" if error >= SEEN else ""
+
+
+READINGS: dict[InterjectionReading, str] = {
+    "open": "not decided yet",
+    "backchannel": "as a listener",
+    "interruption": "takes the floor",
+    "answer": "as an answer",
+    "noise": "without words",
+    "other": "to somebody else",
+}
+
+
+def interjection(message: Interjection) -> str:
+    """Words for what a person says into the robot's turn: `ann, into the turn: "wait" (takes the floor)`."""
+    words = f'"{message.words}" ' if message.words else ""
+    return f"{message.actor}, into the turn: {words}({READINGS[message.reading]})"
+
+
+def floor(message: Floor, robot: str) -> str:
+    """Words for those who speak at once: `at once: ann (to the robot), ben`; empty if fewer than two speak."""
+    if len(message.speeches) < 2:
+        return ""
+    speakers = []
+    for speech in message.speeches:
+        to = " and ".join("the robot" if each == robot else each for each in speech.to)
+        who = "the robot" if speech.actor == robot else speech.actor
+        speakers.append(f"{who} (to {to})" if to else who)
+    return f"at once: {', '.join(speakers)}"
 
 
 def warning(message: WarningFeedback) -> str:

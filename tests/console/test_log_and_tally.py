@@ -9,7 +9,7 @@ from engage_hri.schemas.blocks import BodyHeld, Held, Hold, WarningFeedback
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.recognition import Statistics, WindowStatistics
+from engage_hri.schemas.recognition import Floor, FloorSpeech, Interjection, Statistics, WindowStatistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console import view
 from engage_hri.services.console.terminal import log, tally
@@ -44,6 +44,24 @@ def test_the_log_can_be_narrowed() -> None:
 
     assert all(line.partition("  ")[2].startswith("*") for line in told)
     assert len(told) == 2
+
+
+def test_what_is_said_into_a_turn_is_told_at_once_and_decided() -> None:
+    opened = Interjection(actor="ann", since=at(0.5), at=at(0.6), reading="open")
+    decided = replace(opened, reading="interruption", words="no, wait")
+
+    assert lines(((opened, 10.6), (decided, 10.9)), Telling()) == [
+        "0:00.6  ann, into the turn: (not decided yet)",
+        '0:00.9  ann, into the turn: "no, wait" (takes the floor)',
+    ]
+
+
+def test_the_floor_is_told_when_two_speak_at_once() -> None:
+    ann = FloorSpeech(actor="ann", since=at(0.0), to=("robot",))
+    ben = FloorSpeech(actor="ben", since=at(0.4))
+    alone, both = Floor(at=at(0.0), speeches=(ann,)), Floor(at=at(0.4), speeches=(ann, ben))
+
+    assert lines(((alone, 10.0), (both, 10.4)), Telling()) == ["0:00.4  at once: ann (to the robot), ben"]
 
 
 def test_a_warning_is_told_with_its_place() -> None:

@@ -14,7 +14,7 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import HeadOwner, StudyCondition
 from engage_hri.schemas.messages import Message, line
 from engage_hri.schemas.perception import Utterance
-from engage_hri.schemas.recognition import ConnectionEvent, Statistics
+from engage_hri.schemas.recognition import ConnectionEvent, Floor, Interjection, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.shell.failing_output import FORMAT, Patient, as_file, settle, standard_output
 from engage_hri.services.commandline.shell.options import Connected
@@ -28,6 +28,8 @@ from engage_hri.services.console.terminal.log import Telling
 OTHERS = (
     keys.UTTERANCE,
     keys.ANY_FEEDBACK,
+    keys.ANY_INTERJECTION,
+    keys.FLOOR,
     keys.HEAD_OWNER,
     keys.HELD,
     keys.BODY_HELD,
@@ -38,7 +40,7 @@ OTHERS = (
 SUBJECTS: dict[str, tuple[type[Message], ...]] = {
     "events": (ConnectionEvent,),
     "statistics": (Statistics,),
-    "words": (Utterance,),
+    "words": (Utterance, Interjection, Floor),
     "feedback": (BlockProgress, SyncPointProgress, WarningFeedback),
     "head": (HeadOwner,),
     "holds": (Held, BodyHeld),
@@ -106,7 +108,7 @@ class Wanted(NamedTuple):
         return (*keys.event_stream(self.actor, self.kinds), keys.statistics(keys.chunk(self.actor)), *OTHERS)
 
     def includes(self, message: Message) -> bool:
-        if isinstance(message, Utterance) and self.actor not in ("", message.actor):
+        if isinstance(message, Utterance | Interjection) and self.actor not in ("", message.actor):
             return False
         return any(isinstance(message, SUBJECTS[subject]) for subject in self.subjects)
 

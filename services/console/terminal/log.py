@@ -11,7 +11,7 @@ from engage_hri.schemas.fragments import HeadOwner, StudyCondition
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.participants import PeerGone
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, Utterance
-from engage_hri.schemas.recognition import ConnectionEvent, Statistics
+from engage_hri.schemas.recognition import ConnectionEvent, Floor, Interjection, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console import wording
 from engage_hri.services.console.view import OWN_BLOCKS, Scene, is_again
@@ -58,6 +58,10 @@ def _text(message: Message, before: Scene, after: Scene, at: Seconds, telling: T
             about = f" about {', '.join(message.objects)}" if message.objects else ""
             kind, decided = wording.KINDS[message.kind], wording.decision(message)
             return f"* {kind}, {message.initiator} → {message.responder}{about} ({message.cause}): {decided}"
+        case Interjection():
+            return wording.interjection(message)
+        case Floor():
+            return wording.floor(message, before.robot) or None
         case Statistics() if telling.statistics:
             return wording.statistics(message)
         case HeadOwner() if telling.head:
