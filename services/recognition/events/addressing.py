@@ -34,16 +34,16 @@ EVERYBODY: Addressees = frozenset(("",))
 """Of a speech of the robot of which nobody has said to whom it is."""
 
 
-class Spoken(Struct):
-    """A speech with known addressees. until: None: it goes on."""
+class Spoken(Struct, kw_only=True):
+    """A speech. to: its addressees; None: they are not known yet. until: None: it goes on."""
 
     actor: str
-    to: Addressees
     since: Seconds
+    to: Addressees | None = None
     until: Seconds | None = None
 
-    def is_to(self, person: str) -> bool:
-        return person in self.to or self.to is EVERYBODY
+    def is_to(self, actor: str) -> bool:
+        return self.to is EVERYBODY or (self.to is not None and actor in self.to)
 
     def is_just_before(self, at: Seconds) -> bool:
         """True if a speech that begins at `at` comes during this one, or soon after it."""
@@ -71,22 +71,16 @@ class FaceTimes(Struct):
         return next((face for face, lasted in self.looked.items() if lasted > half), "")
 
 
-class OwnSpeech(Struct):
+class OwnSpeech(Spoken, kw_only=True):
     """A speech of a person, and what tells to whom it is."""
 
-    since: Seconds
     confidence: Probability
     faces: FaceTimes
-    until: Seconds | None = None
     told: Addressees | None = None
     """Addressees by perception."""
     words: str = ""
-    to: Addressees | None = None
-    """Addressees; None: they are not known yet."""
     is_interjected: bool = False
     """True if it began while the robot had the floor."""
-    spoken: Spoken | None = None
-    """The speech as the others remember it, once its addressees are known."""
 
 
 def named(words: str, names: Mapping[str, str]) -> Addressees:
@@ -117,16 +111,16 @@ def certain(
     return None if company and not is_line else frozenset((robot,))
 
 
-def likely(speech: OwnSpeech, speaker: str, spoken: Iterable[Spoken]) -> Addressees:
+def likely(speech: OwnSpeech, spoken: Iterable[Spoken]) -> Addressees:
     """Addressees by rules 4 to 6, once the speech is over, or so far. spoken: what was said before, by all."""
     if face := speech.faces.most(speech.since):
         return frozenset((face,))
     recent = [each for each in spoken if each.is_just_before(speech.since) and each.since < speech.since]
-    asked = max((each for each in recent if each.is_to(speaker)), key=_since, default=None)
+    asked = max((each for each in recent if each.is_to(speech.actor)), key=_since, default=None)
     if asked is not None:
         return frozenset((asked.actor,))
-    own = max((each for each in recent if each.actor == speaker), key=_since, default=None)
-    return NOBODY if own is None else own.to
+    own = max((each for each in recent if each.actor == speech.actor), key=_since, default=None)
+    return NOBODY if own is None or own.to is None else own.to
 
 
 def _since(spoken: Spoken) -> Seconds:

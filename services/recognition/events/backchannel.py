@@ -22,7 +22,6 @@ TABLE = table(
     TransitionRow(IDLE, "announced", BRIEF, ("started", "succeeded")),
     TransitionRow(UNDECIDED, "ends", IDLE, ("started", "succeeded", "completed")),
     TransitionRow(UNDECIDED, "limit", IDLE),
-    TransitionRow(UNDECIDED, "words", IDLE),
     TransitionRow(UNDECIDED, "outlasts_turn", IDLE),
     TransitionRow(UNDECIDED, "announced", BRIEF, ("started", "succeeded")),
     TransitionRow(UNDECIDED, "person_gone", IDLE),

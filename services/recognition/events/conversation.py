@@ -15,7 +15,7 @@ from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.limits import in_time
 from engage_hri.services.recognition.events.listener_sign import WORDS_WAIT, ListenerSign, SignPart
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent
-from engage_hri.services.recognition.events.scene import Question, SessionScene
+from engage_hri.services.recognition.events.scene import SessionScene
 from engage_hri.services.text.listening import is_listening
 
 TURN_PATIENCE: Seconds = 12.0
@@ -37,7 +37,6 @@ class Conversation:
         self.id = id
         self.speaks_since: Seconds | None = None
         self.silent_since: Seconds | None = None
-        self.acts_since: Seconds | None = None
         self.pair = self._new_pair(writer, config)
         self._cut_into: list[tuple[AdjacencyPair, str]] = []
         """Pairs of the person whose first turn still goes on although the robot has answered with a first turn of its
@@ -93,7 +92,7 @@ class Conversation:
             self._was_backchannel(self._sign, until)
         self._sign = None
         self.robot_backchannel.person_gone(at, until)
-        self.speaks_since = self.acts_since = None
+        self.speaks_since = None
         self.silent_since = until
 
     # -- the person ---------------------------------------------------------------------------------------------
@@ -140,7 +139,8 @@ class Conversation:
         elif not self.pair.human_begins(action, at, confidence):
             self.pair.answers_late(action, at, confidence)
 
-    def gesture_ends(self, action: Action, at: Seconds) -> None:
+    def action_ends(self, action: Action, at: Seconds) -> None:
+        """Take the end of a gesture, or of a manipulation."""
         self._ends(action, at, by_robot=False)
 
     # -- signs in the robot's turn ------------------------------------------------------------------------------
@@ -161,8 +161,12 @@ class Conversation:
         sign = self._sign
         if sign is None or (sign.speeches and self._listens(sign.speeches[-1].since)):
             return None
-        is_worded = self.pair.robot_holds_turn and self.id in self._scene.worded
-        return sign.deadline(WORDS_WAIT if is_worded else self._config.backchannel_limit)
+        return sign.deadline(WORDS_WAIT if self._is_worded else self._config.backchannel_limit)
+
+    @property
+    def _is_worded(self) -> bool:
+        """True if words of what the person says now may come, and would decide what it is."""
+        return self.pair.robot_holds_turn and self.id in self._scene.worded
 
     def _sign_is_due(self, at: Seconds) -> None:
         """Decide the sign: its speech has become too long for a backchannel, or its words have not come."""
@@ -180,8 +184,7 @@ class Conversation:
             return
         heard = [(self._listens(speech.since), speech) for speech in sign.speeches]
         interrupts = next((speech for listens, speech in heard if listens is False), None)
-        may_be_known = self.pair.robot_holds_turn and self.id in self._scene.worded and not sign.is_wordless
-        is_known = not may_be_known or all(listens for listens, _ in heard)
+        is_known = not self._is_worded or sign.is_wordless or all(listens for listens, _ in heard)
         if interrupts is not None:
             self._answers(interrupts, at)
         elif sign.until is not None and is_known:
@@ -253,20 +256,12 @@ class Conversation:
         return is_listening(words)
 
     def manipulates(self, at: Seconds, confidence: Probability = 1.0) -> None:
-        if self.acts_since is None:
-            self.acts_since = at
-            self._human_turn(at, "act", confidence)
-
-    def manipulation_ends(self, at: Seconds) -> None:
-        self.acts_since = None
-        self._ends("act", at, by_robot=False)
+        self._human_turn(at, "act", confidence)
 
     def goes_on(self, action: Action, since: Seconds, confidence: Probability) -> None:
         """Take an action of the person that goes on, known only now. It may be the answer, or more of a turn."""
         if action == "speak" and self.speaks_since is None:
             self.speaks_since, self.silent_since = since, None
-        elif action == "act":
-            self.acts_since = since
         if self.pair.event is None or since < self.pair.event.started:
             return
         pair = self.pair
@@ -311,7 +306,9 @@ class Conversation:
     def robot_falls_silent(self, at: Seconds) -> None:
         self.robot_speaks_now = False
         self.pair.robot_heard(at)
-        self._backchannel_speech_ends(self.robot_backchannel, at)
+        listening, since = self.robot_backchannel, self.robot_backchannel.undecided_since
+        if listening.state == BRIEF or (since is not None and in_time(at, since + self._config.backchannel_limit)):
+            listening.ends(at)
         self._ends("speak", at, by_robot=True)
         self._floor_is_free(at)
 
@@ -342,11 +339,6 @@ class Conversation:
             self._keep_floor(at)
         self.pair.turn_ends(at)
         self._floor_is_free(at)
-
-    def _backchannel_speech_ends(self, backchannel: Backchannel, at: Seconds) -> None:
-        since = backchannel.undecided_since
-        if backchannel.state == BRIEF or (since is not None and in_time(at, since + self._config.backchannel_limit)):
-            backchannel.ends(at)
 
     def _floor_is_free(self, at: Seconds) -> None:
         """Turn undecided speech that outlasts the other's turn into a turn of its own."""
@@ -394,16 +386,6 @@ class Conversation:
         if announced is not None and announced.block == block:
             self.robot_backchannel.ends(at)
         self._floor_is_free(at)
-
-    @property
-    def question(self) -> Question | None:
-        return self.pair.question
-
-    def other_answers(self, person: str, action: Action, at: Seconds) -> None:
-        self.pair.other_answers(person, action, at)
-
-    def answered_block_ended(self, at: Seconds) -> None:
-        self.pair.answered_block_ended(at)
 
     def robot_announces(self, event: OngoingEvent, ended: Seconds | None) -> None:
         """Begin the robot's backchannel, unless it has been noticed. ended: when its block was over, if it was."""

@@ -183,4 +183,4 @@ class People:
 def _answered_by_other(taken_up: TakenUp, asked: PersonRecognition) -> None:
     """Tell the person who was asked that somebody else has answered."""
     _, by, action, at = taken_up
-    asked.talk.take(at, lambda talk: talk.other_answers(by, action, at))
+    asked.talk.take(at, lambda talk: talk.pair.other_answers(by, action, at))

@@ -182,16 +182,16 @@ class PersonRecognition:
         del self._doing[action]
         match action:
             case "point":
-                self.talk.take(at, lambda talk: talk.gesture_ends("point", at))
+                self.talk.take(at, lambda talk: talk.action_ends("point", at))
             case "speak":
                 self._scene.falls_silent(self.id, at)
                 self.talk.falls_silent(at)
             case "nod" | "shake":
-                self.talk.take(at, lambda talk: talk.gesture_ends(action, at))
+                self.talk.take(at, lambda talk: talk.action_ends(action, at))
             case "act":
                 self.gaze.spent = True
                 self._scene.acting.discard(self.id)
-                self.talk.take(at, lambda talk: talk.manipulation_ends(at))
+                self.talk.take(at, lambda talk: talk.action_ends("act", at))
 
     def _longest(self, action: Action) -> Seconds:
         if action == "speak":

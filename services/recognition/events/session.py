@@ -22,7 +22,7 @@ from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.addressing import EVERYBODY, Addressees, Spoken
+from engage_hri.services.recognition.events.addressing import EVERYBODY, NOBODY, Addressees, Spoken
 from engage_hri.services.recognition.events.conversation import TURN_PATIENCE
 from engage_hri.services.recognition.events.history import ActionHistory, Latest
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock, anchor
@@ -99,7 +99,7 @@ class Session:
     def floor(self) -> list[tuple[str, Seconds, Addressees]]:
         """All speeches that go on, the first first: who speaks, since when, and to whom (empty: not known yet)."""
         said = self.scene.robot_spoken
-        speeches = [] if said is None else [(self.robot, said.since, said.to - EVERYBODY)]
+        speeches = [] if said is None else [(self.robot, said.since, (said.to or NOBODY) - EVERYBODY)]
         for person in self.persons.values():
             if person.presence.here and person.talk.speaks_since is not None:
                 speeches.append((person.id, person.talk.speaks_since, person.talk.speaks_to))
@@ -239,7 +239,9 @@ class Session:
     def _robot_speaks(self, began: ActionBegan, at: Seconds) -> None:
         self.scene.robot_speaks_since = at
         self.scene.speaks(self.robot)
-        self.scene.robot_spoken = Spoken(self.robot, self.addressees_of(began.behavior) or EVERYBODY, at)
+        self.scene.robot_spoken = Spoken(
+            actor=self.robot, since=at, to=self.addressees_of(began.behavior) or EVERYBODY
+        )
         self.scene.note_spoken(self.scene.robot_spoken)
 
     def _say(self, began: ActionBegan, at: Seconds, step: Step) -> None:
@@ -466,11 +468,7 @@ class Session:
             case "ended":
                 self._ended_turns[signal.turn] = at
                 self._closes(signal.turn)
-                self._apply_to_addressees(
-                    signal.actor,
-                    at,
-                    lambda person: person.talk.take(at, lambda talk: talk.turn_ended(signal.turn, at)),
-                )
+                self._tell(signal.actor, at, lambda talk: talk.turn_ended(signal.turn, at))
             case "answered" | "repaired":
                 repairs = signal.signal == "repaired"
                 self.announce(request)
@@ -509,4 +507,4 @@ class Session:
         self._people.apply_to_all(at, lambda person: person.block_ended(block, at, aborted=aborted))
         answered = self._answering_blocks.pop(block, None)
         if answered is not None:
-            self._tell(answered, at, lambda talk: talk.answered_block_ended(at))
+            self._tell(answered, at, lambda talk: talk.pair.answered_block_ended(at))

@@ -17,7 +17,6 @@ from engage_hri.services.recognition.events.addressing import (
     Addressees,
     FaceTimes,
     OwnSpeech,
-    Spoken,
     certain,
     likely,
 )
@@ -47,7 +46,6 @@ class Talk:
         """What is not told yet, with its times. The first is a speech of which it is not known to whom it is."""
         self._speech: OwnSpeech | None = None
         """The speech of the person that goes on."""
-        self._faces = FaceTimes(0.0)
 
     @property
     def speaks_since(self) -> Seconds | None:
@@ -62,12 +60,12 @@ class Talk:
     @property
     def speaks_to_robot(self) -> bool:
         """True while the person says something that is known to be for the robot."""
-        return self._scene.robot in self.speaks_to
+        return self._speech is not None and self._speech.is_to(self._scene.robot)
 
     @property
     def question(self) -> Question | None:
         """The robot's question that waits for the person's answer; None: none does, or that is not known yet."""
-        return None if self._line else self._conversation.question
+        return None if self._line else self._conversation.pair.question
 
     # -- time ---------------------------------------------------------------------------------------------------
 
@@ -80,7 +78,7 @@ class Talk:
     def timed_steps(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:
         """Steps that are due by themselves, with their times."""
         if self._line:
-            yield self._decided_at, self._decide
+            yield self._decided_at, self._go_on
         else:
             yield from self._conversation.timed_steps
 
@@ -104,7 +102,7 @@ class Talk:
 
     def speaks(self, at: Seconds, confidence: Probability, face: str) -> None:
         """Take the beginning of a speech. face: whose face the person looks at."""
-        self._speech = speech = OwnSpeech(at, confidence, FaceTimes(at, face))
+        self._speech = speech = self._own_speech(at, confidence, face)
         speech.told = self._scene.told_addressees.get((self.id, at))
         self._find(speech, face, at)
         if self._conversation.robot_holds_floor:
@@ -119,11 +117,8 @@ class Talk:
             return
         speech.until = at
         speech.faces.turns("", at)
-        if speech.spoken is not None:
-            speech.spoken.until = at
-        self.take(at, lambda talk: talk.falls_silent(at) if self._scene.robot in (speech.to or ()) else None)
-        if self._line and self._decided_at == at:
-            self._decide(at)
+        self.take(at, lambda talk: talk.falls_silent(at) if speech.is_to(self._scene.robot) else None)
+        self._go_on(at)
 
     def shows(self, at: Seconds, face: str, step: Step) -> None:
         """Take a sign without words, which is to the robot unless the person looks at somebody else's face.
@@ -137,11 +132,10 @@ class Talk:
     def goes_on(self, action: Action, since: Seconds, at: Seconds, confidence: Probability, face: str) -> None:
         """Take an action that goes on, known only now, at `at`. It has been decided by the looks of now to whom."""
         if action == "speak":
-            self._speech = speech = OwnSpeech(since, confidence, FaceTimes(since, face))
+            self._speech = speech = self._own_speech(since, confidence, face)
             if not self._find(speech, face, at):
-                speech.faces.turns(face, at)
-                self._address(speech, likely(speech, self.id, self._scene.spoken), at)
-            if self._scene.robot not in (speech.to or ()):
+                self._likely(speech, at)
+            if not speech.is_to(self._scene.robot):
                 return
         self.take(at, lambda talk: talk.goes_on(action, since, confidence))
 
@@ -159,13 +153,17 @@ class Talk:
         if self._speech is not None and self._speech.until is None:
             self._speech.until = until
         self._speech = None
-        while self._line:
-            self._decide(at)
+        for speech in self._unknown:
+            self._likely(speech, at)
+        self._go_on(at)
         self._conversation.person_gone(at, until)
 
     def person_back(self) -> None:
         """Take the person's return: the robot may be speaking, or may have fallen silent meanwhile."""
         self._conversation.robot_speaks_now = self._scene.robot_speaks_to(self.id)
+
+    def _own_speech(self, since: Seconds, confidence: Probability, face: str) -> OwnSpeech:
+        return OwnSpeech(actor=self.id, since=since, confidence=confidence, faces=FaceTimes(since, face))
 
     # -- the line -----------------------------------------------------------------------------------------------
 
@@ -202,27 +200,19 @@ class Talk:
         speech.to = to
         if speech.is_interjected and self._scene.robot not in to:
             self._writer.interject(self.id, speech.since, "other", at)
-        speech.spoken = Spoken(self.id, to, speech.since, speech.until)
-        self._scene.note_spoken(speech.spoken)
+        self._scene.note_spoken(speech)
 
     def _queue(self, at: Seconds, speech: OwnSpeech) -> None:
         if self._line or speech.to is None:
             self._line.append((at, speech))
             self._note_unknown()
-        elif self._scene.robot in speech.to:
+        elif speech.is_to(self._scene.robot):
             self._conversation.speaks(at, speech.confidence)
-
-    def _decide(self, at: Seconds) -> None:
-        """Decide to whom the first speech in line is, and tell what waits for that."""
-        _, speech = self._line[0]
-        assert isinstance(speech, OwnSpeech)
-        self._likely(speech, at)
-        self._go_on(at)
 
     def _likely(self, speech: OwnSpeech, at: Seconds) -> None:
         """Decide to whom a speech is by what is likely."""
         speech.faces.turns(speech.faces.face, at)
-        self._address(speech, likely(speech, self.id, self._scene.spoken), at)
+        self._address(speech, likely(speech, self._scene.spoken), at)
 
     def _go_on(self, now: Seconds) -> None:
         """Tell all in line up to the next speech of which it is not known to whom it is."""
@@ -236,7 +226,7 @@ class Talk:
             self._catch_up(at)
             if not isinstance(item, OwnSpeech):
                 item(self._conversation)
-            elif self._scene.robot in (item.to or ()):
+            elif item.is_to(self._scene.robot):
                 self._conversation.speaks(at, item.confidence)
         self._note_unknown()
 
