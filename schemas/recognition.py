@@ -211,6 +211,9 @@ class WindowStatistics(Struct, frozen=True, kw_only=True, omit_defaults=True):
     last_start_without_maintenance: Stamp | None = None
 
 
+EngagementLevel = Literal["engaged", "engaging", "disengaging", "disengaged", "unknown"]
+
+
 class Statistics(Struct, frozen=True, kw_only=True, tag="statistics", omit_defaults=True):
     """state: recognition. Statistics of the connection events with one person, or with all, and their engagement.
 
@@ -225,6 +228,6 @@ class Statistics(Struct, frozen=True, kw_only=True, tag="statistics", omit_defau
     session: WindowStatistics
     recent: WindowStatistics
     engagement: Probability | None = None
-    level: Literal["engaged", "engaging", "disengaging", "disengaged", "unknown"] = "unknown"
+    level: EngagementLevel = "unknown"
     reasons: tuple[str, ...] = ()
     busy: bool = False

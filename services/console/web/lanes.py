@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping
 
 from engage_hri.schemas.blocks import BlockProgress, NetPlanned, PlannedPoint, PredictionFeedback, SyncPointProgress
 from engage_hri.schemas.participants import PeerAlive, PeerGone
-from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EventState, Statistics
+from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EngagementLevel, EventState, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.view import OWN_BLOCKS
 from engage_hri.services.console.web import sections
@@ -204,7 +204,7 @@ VALUES_KEPT = 600
 """Values of a course that are kept."""
 APART: Seconds = 0.5
 """Time of which a course keeps two values at most; the newest is always there."""
-UNKNOWN: tuple[sections.Level, tuple[str, ...]] = ("unknown", ("recognition has left the bus",))
+UNKNOWN: tuple[EngagementLevel, tuple[str, ...]] = ("unknown", ("recognition has left the bus",))
 """Level of everybody, with the reason, while there is no recognition."""
 Course = deque[tuple[Seconds, float]]
 
@@ -217,7 +217,7 @@ class Measures:
         self._delays: deque[tuple[Seconds, float, str]] = deque(maxlen=VALUES_KEPT)
         self._life = ""
         """Life of recognition; empty: unknown."""
-        self._left: dict[str, tuple[sections.Level, tuple[str, ...]]] = {}
+        self._left: dict[str, tuple[EngagementLevel, tuple[str, ...]]] = {}
         """Levels and reasons that recognition told last, while it is not there."""
 
     @property
@@ -261,7 +261,7 @@ class Measures:
                 return False
         return True
 
-    def _set(self, told: Mapping[str, tuple[sections.Level, tuple[str, ...]]]) -> None:
+    def _set(self, told: Mapping[str, tuple[EngagementLevel, tuple[str, ...]]]) -> None:
         for actor, (level, reasons) in told.items():
             self._people[actor].level, self._people[actor].reasons = level, reasons
 
@@ -283,7 +283,7 @@ class Measures:
 
 class _Person:
     def __init__(self) -> None:
-        self.level: sections.Level = "unknown"
+        self.level: EngagementLevel = "unknown"
         self.reasons: tuple[str, ...] = ()
         self.engagement: Course = deque(maxlen=VALUES_KEPT)
         self.mtbce: Course = deque(maxlen=VALUES_KEPT)

@@ -5,19 +5,17 @@ metres, in the frame of the robot.
 """
 
 from collections.abc import Callable
-from typing import Literal
 
 from msgspec import Struct
 
 from engage_hri.schemas.behaviors import EventKind
 from engage_hri.schemas.fragments import PairConsidered
-from engage_hri.schemas.recognition import EventState
+from engage_hri.schemas.recognition import EngagementLevel, EventState
 from engage_hri.schemas.units import Meters, Radians, Seconds, Vector
 
 Point = tuple[float, float]
 Zero = Callable[[Seconds], Seconds]
 """Conversion of an instant to seconds of the picture."""
-Level = Literal["engaged", "engaging", "disengaging", "disengaged", "unknown"]
 
 
 class Thing(Struct, frozen=True):
@@ -266,7 +264,7 @@ class PersonMeasures(Struct, frozen=True):
     """
 
     actor: str
-    level: Level
+    level: EngagementLevel
     reasons: tuple[str, ...]
     engagement: tuple[Point, ...]
     mtbce: tuple[Point, ...]

@@ -12,6 +12,7 @@ The levels are those of ROS4HRI: a person becomes engaged and leaves again by wa
 
 from typing import Literal, NamedTuple
 
+from engage_hri.schemas.recognition import EngagementLevel
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import HYSTERESIS, RecognitionConfig
 from engage_hri.services.recognition.statistics.contact import CONTACT_MEMORY, ContactShare
@@ -20,7 +21,6 @@ from engage_hri.services.recognition.statistics.tally import EventTally
 ENOUGH_EVENTS = 5
 """Number of connection events from which a person's own mean counts; at least 2, since one event has no time between
 events. Ours."""
-Level = Literal["engaged", "engaging", "disengaging", "disengaged", "unknown"]
 JUST_AFTER: Seconds = 0.001
 """Delay after the instant at which the estimate is on a threshold; then it has passed it."""
 IN_CONTACT: Probability = 0.5
@@ -33,7 +33,7 @@ LOOK_AGAIN: Seconds = 1.0
 
 class EngagementEstimate(NamedTuple):
     value: Probability | None
-    level: Level
+    level: EngagementLevel
     reasons: tuple[str, ...]
 
 
@@ -51,7 +51,7 @@ def quality(failed: int, judged: int) -> Probability:
     return 1.0 - failed / judged if judged else 1.0
 
 
-def next_level(level: Level, value: Probability, config: RecognitionConfig) -> Level:
+def next_level(level: EngagementLevel, value: Probability, config: RecognitionConfig) -> EngagementLevel:
     """Level of `value`; it changes only when the value has passed a threshold by the hysteresis."""
     margin = 0.0 if level == "unknown" else HYSTERESIS
     engaged_from = config.engaged_from + (-margin if level == "engaged" else margin)
@@ -94,15 +94,15 @@ class Engagement:
         self.busy = busy
         return self.estimate
 
-    def level_changes(self, now: Seconds) -> bool:
-        """True if the level is another now than it was told."""
-        return not self.busy and self._estimate(now).level != self.estimate.level
-
-    def drifts(self, now: Seconds) -> bool:
-        """True if by contact alone the value is another now than it was told."""
-        if self.busy or self.contact.now is None:
-            return False
-        return abs((self._estimate(now).value or 0.0) - (self.estimate.value or 0.0)) >= TOLD_AGAIN
+    def news(self, now: Seconds) -> Literal["", "value", "level"]:
+        """Change since it was told: of the level, or by contact alone of the value; "": neither."""
+        if self.busy:
+            return ""
+        estimate, told = self._estimate(now), self.estimate
+        if estimate.level != told.level:
+            return "level"
+        drifts = self.contact.now is not None and abs((estimate.value or 0.0) - (told.value or 0.0)) >= TOLD_AGAIN
+        return "value" if drifts else ""
 
     def _estimate(self, now: Seconds) -> EngagementEstimate:
         known: list[Probability] = []

@@ -40,8 +40,9 @@ class _ActorStatistics:
 
     def look(self, now: Seconds) -> None:
         """Take what changes by the passing of time."""
-        self.is_new = self.is_new or self.leaves <= now or self.engagement.drifts(now)
-        self.is_urgent = self.is_urgent or self.engagement.level_changes(now)
+        news = self.engagement.news(now)
+        self.is_new = self.is_new or self.leaves <= now or news == "value"
+        self.is_urgent = self.is_urgent or news == "level"
 
     def is_due(self, now: Seconds) -> bool:
         return self.is_urgent or (self.is_new and now >= self.told_at + TOLD_EVERY)
