@@ -1,5 +1,6 @@
 """State of robot, people and world besides the events: gazes, speakers, things on the table."""
 
+from collections import deque
 from typing import NamedTuple
 
 from msgspec import Struct
@@ -111,7 +112,6 @@ class SessionScene:
         self.robot = robot
         self.resolution = resolution
         self.gaze = GazeState()
-        self.robot_speaks_since: Seconds | None = None
         self.robot_spoken: Spoken | None = None
         """What the robot says now."""
         self.head_owner = Claim(kind="none", priority=0)
@@ -138,14 +138,14 @@ class SessionScene:
         """True if perception has ever told to whom somebody speaks."""
         self.told_addressees: Latest[tuple[str, Seconds], Addressees] = Latest(SPOKEN_KEPT)
         """To whom a speech is by perception, by speaker and start, if that is told before the speech."""
-        self.spoken: list[Spoken] = []
+        self.spoken: deque[Spoken] = deque(maxlen=SPOKEN_KEPT)
         """The latest speeches whose addressees are known, of all."""
         self.questions: dict[str, Question] = {}
         """Questions of the robot that wait for an answer, by the person who was asked."""
-        self.unknown: dict[str, Seconds] = {}
-        """Start of the first speech of each person of which it is not known yet to whom it is."""
         self.taken_up: list[TakenUp] = []
         """Answers to them by somebody else, which the person who was asked has yet to be told of."""
+        self.unknown: dict[str, Seconds] = {}
+        """Start of the first speech of each person of which it is not known yet to whom it is."""
         self.listening_blocks: Latest[str, None] = Latest(BLOCKS_KEPT)
         """Blocks under way that the robot has announced as backchannels: they answer nobody."""
         self.speech = 0
@@ -190,7 +190,12 @@ class SessionScene:
     def note_spoken(self, spoken: Spoken) -> None:
         """Remember a speech whose addressees are known now."""
         self.floor_changes += 1
-        self.spoken = [*self.spoken[1 - SPOKEN_KEPT :], spoken]
+        self.spoken.append(spoken)
+
+    @property
+    def robot_speaks_since(self) -> Seconds | None:
+        """Time when the robot began what it says now; None: it is silent."""
+        return None if self.robot_spoken is None else self.robot_spoken.since
 
     def robot_speaks_to(self, person: str) -> bool:
         """True while the robot speaks to this person, or to nobody known."""
@@ -223,7 +228,7 @@ class SessionScene:
     def robot_falls_silent(self, at: Seconds) -> None:
         if self.robot_spoken is not None:
             self.robot_spoken.until = at
-        self.robot_speaks_since = self.robot_spoken = None
+        self.robot_spoken = None
         self.falls_silent(self.robot, at)
 
     def is_listening(self, behavior: str) -> bool:

@@ -237,7 +237,6 @@ class Session:
                 self._say(began, at, lambda talk: talk.robot_gestures(began.action, at, listens=listens))
 
     def _robot_speaks(self, began: ActionBegan, at: Seconds) -> None:
-        self.scene.robot_speaks_since = at
         self.scene.speaks(self.robot)
         self.scene.robot_spoken = Spoken(
             actor=self.robot, since=at, to=self.addressees_of(began.behavior) or EVERYBODY
@@ -426,10 +425,8 @@ class Session:
 
     def _ask(self, person: PersonRecognition, event: OngoingEvent, wanted: Event) -> None:
         event.accept = wanted.accept or ACCEPT
-        at, turn_end = (
-            event.started,
-            self._ended_turns.get(event.turn) if event.turn else self.blocks.ended.get(event.block),
-        )
+        at = event.started
+        turn_end = self._ended_turns.get(event.turn) if event.turn else self.blocks.ended.get(event.block)
         person.talk.take(at, lambda talk: talk.robot_asks(event))
         if turn_end is None:
             self._opens(event.turn, event.responder)
