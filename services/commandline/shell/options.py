@@ -234,9 +234,6 @@ class Written:
     ] = None
     feedback: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Write the blocks' feedback as JSON lines, into FILE.xml as XML; - for standard output.",
-        ),
+        typer.Option(metavar="FILE", help="Write the blocks' feedback as JSON lines; - for standard output."),
     ] = None
     quiet: Quiet = False
