@@ -19,6 +19,7 @@ from engage_hri.services.recognition.events.limits import BLOCKS_KEPT
 from engage_hri.services.recognition.events.machine import TEXTS_KEPT
 from engage_hri.services.recognition.events.session import ACTIONS_KEPT, TURNS_KEPT
 from engage_hri.services.recognition.perceive.clock_errors import PEOPLE_KEPT
+from engage_hri.services.recognition.perceive.clock_restarts import REPORTERS_KEPT
 from engage_hri.services.recording.disk import FULL_CHUNK
 from engage_hri.services.recording.writing import MOST_CHANNELS
 from engage_hri.services.requests.serving import KEPT as NAMES_KEPT
@@ -32,7 +33,8 @@ LIMITS = {
     "_performed": ACTIONS_KEPT, "_texts": TEXTS_KEPT, "_spoken": TEXTS_KEPT, "_points": BLOCKS_KEPT,
     "events": EVENTS_KEPT, "said": UTTERANCES_SHOWN, "warned": WARNINGS_KEPT, "_encoded[*][*]": 2**20,
     "_channel_ids": MOST_CHANNELS, "channel_message_counts": MOST_CHANNELS,
-    "_indices": FULL_CHUNK // 31, "records": FULL_CHUNK // 31, "_heap": 4 * SLACK, "_scheduled": 400,
+    "_clocks": REPORTERS_KEPT, "_addressed": BLOCKS_KEPT, "_indices": FULL_CHUNK // 31, "records": FULL_CHUNK // 31,
+    "_heap": 4 * SLACK, "_scheduled": 400,
 }  # fmt: skip
 """Containers that are bounded by number, not by time: a message of a recording has 31 bytes at least.
 The last two drop what is outdated once there is much of it."""
