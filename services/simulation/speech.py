@@ -16,10 +16,13 @@ from engage_hri.services.client.people.actions import RECOGNIZING, Utterances, s
 from engage_hri.services.simulation.human import Act, Pause, Start, Stop, Understood
 
 
-def speech(words: str, seconds: Seconds | None = None) -> tuple[Act, ...]:
-    """Acts of saying these words. seconds: that it takes; None: as long as such words do."""
+def speech(words: str, seconds: Seconds | None = None, to: tuple[str, ...] = ()) -> tuple[Act, ...]:
+    """Acts of saying these words. seconds: that it takes; None: as long as such words do. to: whom, if that is told.
+
+    Without words it is a laugh.
+    """
     return (
-        Start("speak", words=words),
+        Start("speak", words=words, to=to),
         Pause(speaking_time(words) if seconds is None else seconds),
         Stop("speak"),
         Pause(RECOGNIZING),
@@ -37,8 +40,8 @@ class SpokenWords:
     def does(self, act: Act, at: Stamp) -> Iterator[Utterance]:
         """Take an act; only those that concern speech count."""
         match act:
-            case Start(action="speak", words=words) if words:
-                self._said = replace(self._utterances.begun(at), text=words)
+            case Start(action="speak", words=words, to=to) if words:
+                self._said = replace(self._utterances.begun(at, to), text=words)
                 yield replace(self._said, text="")
             case Stop(action="speak") if self._said is not None:
                 self._said = replace(self._said, ended=at)
