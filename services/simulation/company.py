@@ -60,7 +60,7 @@ class Company:
             human.feed(message, now)
 
     def advance(self, now: Seconds, stamp: Stamp) -> Iterator[ActionEvent | Utterance]:
-        """Do what is due. stamp: of `now`."""
+        """Acts that are due, as perception tells of them. stamp: of `now`."""
         for person, human in self._humans.items():
             while acts := human.due(now):
                 yield from self._bodies[person].does(acts[0], stamp)

@@ -40,7 +40,7 @@ AGAIN: Seconds = 0.5
 Kind = Literal["talk", "answer", "feedback", "laugh"]
 
 
-class Line(Struct, frozen=True):
+class ScriptLine(Struct, frozen=True):
     """A line of a script: `actor` says `words` to `to`, `after` seconds after the line before has ended."""
 
     actor: str
@@ -49,7 +49,7 @@ class Line(Struct, frozen=True):
     after: Seconds = 0.5
 
 
-class Said(Struct, frozen=True):
+class Saying(Struct, frozen=True):
     """The truth of what was said. to: actor id. words: empty for a laugh."""
 
     actor: str
@@ -81,12 +81,12 @@ class Party(Company):
         life: str = "",
         *,
         habits: PartyHabits = PartyHabits(),  # noqa: B008
-        script: Iterable[Line] | None = None,
+        script: Iterable[ScriptLine] | None = None,
         tells: bool = False,
     ) -> None:
         super().__init__({person: Human(()) for person in people}, robot, life)
         self.people = tuple(people)
-        self.said: list[Said] = []
+        self.said: list[Saying] = []
         self._chance, self._robot, self._habits, self._tells = chance, robot, habits, tells
         self._script = None if script is None else iter(script)
         self._next = None if self._script is None else next(self._script, None)
@@ -98,7 +98,7 @@ class Party(Company):
         self._attends: dict[str, str] = {}
         """Whom each person looks at, but for looks away."""
         self._away: set[str] = set()
-        self._last: Said | None = None
+        self._last: Saying | None = None
         """What was said last that took the floor."""
         self._asked: set[str] = set()
         """Who has been asked by the robot, and has not answered yet."""
@@ -155,24 +155,24 @@ class Party(Company):
             if self._next is not None:
                 self._plan(max(now, said.ended + self._next.after), self._talk)
 
-    def _take_turn(self, line: Line, words: str, seconds: Seconds, now: Seconds) -> Said:
+    def _take_turn(self, line: ScriptLine, words: str, seconds: Seconds, now: Seconds) -> Saying:
         self._last = self._say(line.actor, line.to, "talk", words, seconds, now)
         return self._last
 
-    def _drawn(self, now: Seconds) -> Line | None:
+    def _drawn(self, now: Seconds) -> ScriptLine | None:
         """Draw who speaks to whom. None: nobody can now."""
         chance, last = self._chance, self._last
         free = [each for each in self.people if self._is_free(each, now)]
         if not free:
             return None
         if last is not None and last.to in free and chance.random() < self._habits.replies:
-            return Line(last.to, last.actor, "")
+            return ScriptLine(last.to, last.actor, "")
         actor = chance.choice(free)
         others = [each for each in self.people if each != actor]
         is_robots_turn = self._robot_speaks or self._asked
         if not others or (chance.random() < self._habits.addresses_robot and not is_robots_turn):
-            return Line(actor, self._robot, chance.choice(TO_ROBOT))
-        return Line(actor, chance.choice(others), "")
+            return ScriptLine(actor, self._robot, chance.choice(TO_ROBOT))
+        return ScriptLine(actor, chance.choice(others), "")
 
     def _words(self, seconds: Seconds) -> str:
         words = ""
@@ -180,8 +180,8 @@ class Party(Company):
             words = f"{words}, {self._chance.choice(TALK)}".strip(", ")
         return f"{words}."
 
-    def _say(self, actor: str, to: str, kind: Kind, words: str, seconds: Seconds, now: Seconds) -> Said:
-        said = Said(actor, to, kind, words, now, now + seconds)
+    def _say(self, actor: str, to: str, kind: Kind, words: str, seconds: Seconds, now: Seconds) -> Saying:
+        said = Saying(actor, to, kind, words, now, now + seconds)
         self.said.append(said)
         self._speaking[actor] = said.ended
         self._does(actor, now, *speech(words, seconds, (to,) if self._tells else ()))

@@ -17,7 +17,7 @@ from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.intake import Intake, reads
 from engage_hri.services.reports.ongoing_actions import OngoingActionTracker
 from engage_hri.services.runtime.intake import Input, PublishMessage, StepClock
-from engage_hri.services.simulation.party import NAMES, Party, Said
+from engage_hri.services.simulation.party import NAMES, Party, Saying
 from tests.recognition.observations import ROBOT, request_event, stamp, world
 
 EVERY = (12.0, 20.0)
@@ -40,7 +40,7 @@ class Play:
         self.party = Party(NAMES[:people], random.Random(seed), ROBOT, f"life-{seed}", tells=tells)
         self.intake = Intake(ROBOT, RecognitionConfig(), StepClock("loop"), "session")
         self.questions: list[Question] = []
-        self.said: list[Said] = []
+        self.said: list[Saying] = []
         self.events: list[ConnectionEvent] = []
         self.perceived = 0
         """Messages of perception."""

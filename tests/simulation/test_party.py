@@ -8,7 +8,7 @@ import pytest
 
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import ActionBegan, Utterance
-from engage_hri.services.simulation.party import NAMES, Line, Party, Said
+from engage_hri.services.simulation.party import NAMES, Party, Saying, ScriptLine
 from tests.recognition.observations import ROBOT, stamp
 from tests.simulation.party_play import Play
 
@@ -22,7 +22,7 @@ def judged(play: Play) -> Counter[str]:
     """What recognition told of pairs, by the truth."""
     truth = {(said.actor, round(said.began, 4)): said for said in play.said}
     ends = {round(question.began, 4): question.ended for question in play.questions}
-    found: set[Said] = set()
+    found: set[Saying] = set()
     counted = Counter(said=len(play.said), to_others=sum(said.to != ROBOT for said in play.said))
     for event in play.events:
         if event.kind != "adjacency_pair":
@@ -61,7 +61,7 @@ def test_what_is_said_to_others_is_not_the_robots_and_its_questions_are_answered
 
 
 def test_a_seed_gives_the_same_party_and_another_another() -> None:
-    def heard(seed: int) -> tuple[list[Said], list[Message]]:
+    def heard(seed: int) -> tuple[list[Saying], list[Message]]:
         play = Play(3, seed)
         play.until(60.0)
         return play.said, play.messages
@@ -107,7 +107,7 @@ def test_nobody_says_two_things_at_once_and_looks_away_are_short() -> None:
 
 
 def test_a_script_says_who_says_what_to_whom() -> None:
-    script = [Line("ann", "bob", "Is that yours?"), Line("bob", "ann", "No, it is hers.", after=-0.2)]
+    script = [ScriptLine("ann", "bob", "Is that yours?"), ScriptLine("bob", "ann", "No, it is hers.", after=-0.2)]
     party = Party(NAMES[:2], random.Random(1), script=script, tells=True)
     party.begin(0.0)
     told = []
@@ -124,7 +124,9 @@ def test_a_script_says_who_says_what_to_whom() -> None:
 
 
 def test_who_goes_on_at_once_keeps_the_words_of_both() -> None:
-    party = Party(NAMES[:2], random.Random(1), script=[Line("ann", "bob", "One."), Line("ann", "bob", "Two.", 0.05)])
+    party = Party(
+        NAMES[:2], random.Random(1), script=[ScriptLine("ann", "bob", "One."), ScriptLine("ann", "bob", "Two.", 0.05)]
+    )
     party.begin(0.0)
     told = []
     while (at := party.deadline) is not None and at < 10.0:

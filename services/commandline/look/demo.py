@@ -89,6 +89,9 @@ def _check(options: Options) -> None:
             raise InputRefused(Fault(reason=reason, where=option, advice=advice))
     if options.you and options.window is False:
         raise InputRefused(Fault(reason="the seat is in the window", where="--you", advice="leave out --no-window"))
+    for option, taken in (("--you", options.you), ("--human", options.human)):
+        if options.people and taken:
+            raise InputRefused(Fault(reason="the people of --people sit there", where=option, advice="leave it out"))
 
 
 async def demonstrate(

@@ -171,7 +171,7 @@ class SessionScene:
         self.people_in_world = frozenset(person.id for person in world.people) - {self.robot}
 
     def told_to(self, person: str, since: Seconds) -> Addressees | None:
-        """To whom a speech is by perception, if that was told before the speech; None: it was not."""
+        """Addressees of a speech by perception, if they were told before the speech; None: they were not."""
         told = ((at, to) for (who, at), to in reversed(self.told_addressees.items()) if who == person)
         return next((to for at, to in told if abs(at - since) <= TOLD_MARGIN), None)
 
