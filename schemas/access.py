@@ -124,7 +124,7 @@ SERVED = {
 WATCHED = (
     keys.ANY_REQUEST_STATE, keys.ANY_FEEDBACK, keys.SYNC_POINT, keys.ANY_ACTION, keys.UTTERANCE,
     keys.ANY_CONNECTION_EVENT, keys.ANY_FAULT, keys.HEAD_OWNER, keys.HELD, keys.BODY_HELD, keys.BODY_FAULTS,
-    keys.STUDY_CONDITION, keys.ANY_OPEN_EVENTS, keys.ANY_STATISTICS,
+    keys.STUDY_CONDITION, keys.ANY_OPEN_EVENTS, keys.ANY_STATISTICS, keys.FLOOR, keys.ANY_INTERJECTION,
 )  # fmt: skip
 """Expressions for all that a person watches, or a program that drives the robot."""
 ANY_STATUS = keys.status("*")
@@ -199,7 +199,7 @@ TABLE: tuple[Row, ...] = (
     Row("realizer", "asks", keys.ESTIMATE),
     *_service(
         "recognition", keys.ANY_CONNECTION_EVENT, keys.RECOGNIZED_ACTION, keys.ANY_OPEN_EVENTS, keys.ANY_STATISTICS,
-        keys.ANY_INTERJECTION,
+        keys.ANY_INTERJECTION, keys.FLOOR,
         heard=(keys.ROBOT_ACTION, keys.PERCEIVED_ACTION, keys.UTTERANCE, keys.ROBOT_ONGOING,
                keys.ANY_PERCEIVED_ONGOING,
                keys.FEEDBACK, keys.HEAD_OWNER, keys.WORLD, *_RAW, keys.ROBOT_STATE),

@@ -77,7 +77,11 @@ async def visit(flows: set[Flow]) -> None:
                 await guard.set_condition("operational")
                 await alice.interrupt("b", "s")
                 await speaking
-            await alice.perform(TurnFragment(id="whole", behaviors=(SPEECH,)))
+            performing = asyncio.create_task(alice.perform(TurnFragment(id="whole", behaviors=(SPEECH,))))
+            await asyncio.sleep(2.0)
+            async with perceive("human", hub=hub, name="camera") as person:
+                await person.say("uh-huh")
+            await performing
             performing = asyncio.create_task(alice.perform(TurnFragment(id="cut", behaviors=(SPEECH,))))
             await asyncio.sleep(2.0)
             performing.cancel()
