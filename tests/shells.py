@@ -27,7 +27,8 @@ SHELLS = {
     "services/control/contract/bell.py",  # waits for a moment or a change of authority
     "services/console/web/sessions.py",  # ends sessions whose page does not come back
     "services/recording/replay.py",  # says what was said
-    "services/simulation/still.py",  # a world, published once
+    "services/simulation/still.py",  # a world, published once, and what its people do
+    "services/tangram/collaboration/host.py",  # asks people who talk
     "services/console/follow.py",  # subscribes
     "services/console/terminal/live.py",  # draws
     "services/console/web/server.py",  # serves the page

@@ -74,11 +74,12 @@ class Pause(Struct, frozen=True):
 
 
 class Start(Struct, frozen=True):
-    """Begin to speak, nod, shake the head, or point at `target`. words: of speech."""
+    """Begin to speak, nod, shake the head, or point at `target`. words, to: of speech, and to whom, if told."""
 
     action: Action
     target: str = ""
     words: str = ""
+    to: tuple[str, ...] = ()
 
 
 class Stop(Struct, frozen=True):

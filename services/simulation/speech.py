@@ -16,15 +16,14 @@ from engage_hri.services.client.people.actions import RECOGNIZING, Utterances, s
 from engage_hri.services.simulation.human import Act, Pause, Start, Stop, Understood
 
 
-def speech(words: str, seconds: Seconds | None = None) -> tuple[Act, ...]:
-    """Acts of saying these words. seconds: that it takes; None: as long as such words do."""
-    return (
-        Start("speak", words=words),
-        Pause(speaking_time(words) if seconds is None else seconds),
-        Stop("speak"),
-        Pause(RECOGNIZING),
-        Understood(),
-    )
+def speech(words: str, seconds: Seconds | None = None, to: tuple[str, ...] = ()) -> tuple[Act, ...]:
+    """Acts of saying these words. seconds: that it takes; None: as long as such words do. to: whom, if that is told.
+
+    Without words it is a laugh.
+    """
+    seconds = speaking_time(words) if seconds is None else seconds
+    voice = (Start("speak", words=words, to=to), Pause(seconds), Stop("speak"))
+    return (*voice, Pause(RECOGNIZING), Understood()) if words else voice
 
 
 class SpokenWords:
@@ -32,19 +31,19 @@ class SpokenWords:
 
     def __init__(self, person: str, life: str) -> None:
         self._utterances = Utterances(person, life)
-        self._said: Utterance | None = None
+        self._said: list[Utterance] = []
+        """Those whose words are not known for good yet. Who goes on at once has two."""
 
     def does(self, act: Act, at: Stamp) -> Iterator[Utterance]:
         """Take an act; only those that concern speech count."""
         match act:
-            case Start(action="speak", words=words) if words:
-                self._said = replace(self._utterances.begun(at), text=words)
-                yield replace(self._said, text="")
-            case Stop(action="speak") if self._said is not None:
-                self._said = replace(self._said, ended=at)
-            case Understood() if self._said is not None:
-                yield replace(self._said, at=at, final=True)
-                self._said = None
+            case Start(action="speak", words=words, to=to) if words:
+                self._said.append(replace(self._utterances.begun(at, to), text=words))
+                yield replace(self._said[-1], text="")
+            case Stop(action="speak") if self._said and self._said[-1].ended is None:
+                self._said[-1] = replace(self._said[-1], ended=at)
+            case Understood() if self._said:
+                yield replace(self._said.pop(0), at=at, final=True)
 
 
 THINKING = "ummmm"

@@ -129,3 +129,17 @@ def test_a_misplaced_piece_is_asked_for_again(engage: Engage, played: dict[str, 
     fragments = [int(re.findall(r"(\d+) fragments", text)[-1]) for text in (played["out"], result.out)]
     assert result.code == 0
     assert fragments[1] > fragments[0]
+
+
+def test_people_talk_with_each_other_and_the_robot_asks(engage: Engage) -> None:
+    out = engage(*VIRTUAL, "--people", "3", "--seed", "2").out
+
+    for expected in ("cy is here", 'robot: "Ann, ', 'robot: "Cy, ', "adjacency pair, robot → bob (turn): succeeded"):
+        assert expected in out
+
+
+def test_people_who_talk_take_the_seat_of_others(engage: Engage) -> None:
+    told = engage(*VIRTUAL, "--people", "2", "--human", "listening")
+
+    assert told.code == 2
+    assert "leave it out" in told.err

@@ -43,6 +43,15 @@ class Options(Written, Simulated, Embodied, Shown):
         bool, typer.Option("--you", help="You are the person: take the seat in the browser, and lay the pieces.")
     ] = False
 
+    people: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            min=1,
+            max=8,
+            help="N people talk with each other, without a tangram; the robot asks now and then.",
+        ),
+    ] = None
     record: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Record all of it into FILE, as `engage record` does.", show_default=False),
@@ -51,7 +60,9 @@ class Options(Written, Simulated, Embodied, Shown):
     @property
     def overrides(self) -> tuple[str, ...]:
         """Settings of the options."""
-        return (*super().overrides, *(("simulation.human=none",) if self.you else ()))
+        you = ("simulation.human=none",) if self.you else ()
+        party = ("simulation.human=party", f"simulation.people={self.people}", "collaboration.mode=host")
+        return (*super().overrides, *you, *(party if self.people else ()))
 
 
 def main(options: Options) -> int:
@@ -78,6 +89,9 @@ def _check(options: Options) -> None:
             raise InputRefused(Fault(reason=reason, where=option, advice=advice))
     if options.you and options.window is False:
         raise InputRefused(Fault(reason="the seat is in the window", where="--you", advice="leave out --no-window"))
+    for option, taken in (("--you", options.you), ("--human", options.human)):
+        if options.people and taken:
+            raise InputRefused(Fault(reason="the people of --people sit there", where=option, advice="leave it out"))
 
 
 async def demonstrate(

@@ -17,6 +17,8 @@ from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, in_time
 LINES_KEPT = 256
 SPOKEN_KEPT = 32
 """Number of speeches of all that are remembered with their addressees."""
+TOLD_MARGIN: Seconds = 0.1
+"""Difference of the beginnings of a speech and of words that are told just before it. Ours."""
 SAME_INSTANT: Seconds = 0.001
 """Longest gap between two looks at the same target that count as one."""
 
@@ -167,6 +169,11 @@ class SessionScene:
             if person.id != self.robot:
                 self.names |= {name.casefold(): person.id for name in (person.id, person.name) if name}
         self.people_in_world = frozenset(person.id for person in world.people) - {self.robot}
+
+    def told_to(self, person: str, since: Seconds) -> Addressees | None:
+        """Addressees of a speech by perception, if they were told before the speech; None: they were not."""
+        told = ((at, to) for (who, at), to in reversed(self.told_addressees.items()) if who == person)
+        return next((to for at, to in told if abs(at - since) <= TOLD_MARGIN), None)
 
     def forget_others(self, before: Seconds) -> None:
         """Forget the people and hands that have not been seen since `before`."""

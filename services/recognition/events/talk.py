@@ -103,7 +103,7 @@ class Talk:
     def speaks(self, at: Seconds, confidence: Probability, face: str) -> None:
         """Take the beginning of a speech. face: whose face the person looks at."""
         self._speech = speech = self._own_speech(at, confidence, face)
-        speech.told = self._scene.told_addressees.get((self.id, at))
+        speech.told = self._scene.told_to(self.id, at)
         self._find(speech, face, at)
         if self._conversation.robot_holds_floor:
             self._writer.interject(self.id, at, "open", at)
@@ -211,7 +211,8 @@ class Talk:
 
     def _likely(self, speech: OwnSpeech, at: Seconds) -> None:
         """Decide to whom a speech is by what is likely."""
-        speech.faces.turns(speech.faces.face, at)
+        if speech.until is None:
+            speech.faces.turns(speech.faces.face, at)
         self._address(speech, likely(speech, self._scene.spoken), at)
 
     def _go_on(self, now: Seconds) -> None:

@@ -136,9 +136,14 @@ class Words:
         )  # fmt: skip
 
     def _told_early(self, person: _Person, words: TimedWords) -> Worded | None:
-        """News that words will come, and addressees that perception knows before it is sure of these."""
-        speech = person.speech_with(words)
-        return None if speech is None else Worded(actor=words.actor, since=speech, text="", to=words.to)
+        """News that words will come, and addressees that perception knows before it is sure of these.
+
+        They may come before the speech itself does.
+        """
+        last = person.speeches[-1] if person.speeches else None
+        if last is not None and words.began < last.until:
+            return Worded(actor=words.actor, since=last.since, text="", to=words.to)
+        return None if words.to is None else Worded(actor=words.actor, since=words.began, text="", to=words.to)
 
     def speech(self, words: TimedWords) -> list[ActionBegan | ActionEnded]:
         """The speech that words without any are by themselves, as actions."""

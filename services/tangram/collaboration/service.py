@@ -18,13 +18,23 @@ from engage_hri.services.runtime.settings import tell_settings
 from engage_hri.services.tangram.collaboration import plans
 from engage_hri.services.tangram.collaboration.appendix_b import turns
 from engage_hri.services.tangram.collaboration.config import CollaborationConfig
+from engage_hri.services.tangram.collaboration.host import host
 from engage_hri.services.tangram.collaboration.pieces_in_view import PiecesInView
 from engage_hri.services.tangram.collaboration.placement import has_been_placed
 from engage_hri.services.tangram.table import tangram_table
 
 
 async def collaborate(bus: Bus, ready: Ready, config: CollaborationConfig) -> None:
-    """Play the tangram once, with the first person who comes, or who comes after them; return after the goodbye."""
+    """Play the tangram once, with the first person who comes, or who comes after them; return after the goodbye.
+
+    As a host, ask those who are there some questions instead.
+    """
+    if config.mode == "host":
+        async with Robot.on(bus) as robot:
+            tell_settings(bus, "collaboration", config)
+            ready()
+            await host(robot)
+        return
     manager = plans.Manager(config, tangram_table())
     plan = plans.script(manager, turns(manager)) if config.mode == "scripted" else plans.task(manager)
     async with Robot.on(bus) as robot, asyncio.TaskGroup() as tasks:

@@ -6,8 +6,9 @@ from typing import Literal
 from msgspec import Struct
 
 from engage_hri.schemas.units import Degrees, Meters, Probability, Seconds, not_negative, positive, shares
+from engage_hri.services.simulation.party import NAMES
 
-HumanKind = Literal["appendix-b", "misplacing", "listening", "stochastic", "attentive", "none"]
+HumanKind = Literal["appendix-b", "misplacing", "listening", "stochastic", "attentive", "party", "none"]
 
 
 class PerceptionFaults(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -58,10 +59,13 @@ class SimulationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     human: `appendix-b` follows Appendix B by the ids of the robot's blocks; `misplacing` does too, but lays one
     piece wrongly; `listening` does what the robot's words say, whatever the manager's plan; `stochastic` too, with
     the habits, pace and mistakes of `habits.py`; `attentive` looks where the robot looks, meets its eyes, and nods
-    when it has spoken, says yes to a question, or does what it asks for; `none` leaves the table alone.
+    when it has spoken, says yes to a question, or does what it asks for; `party` is several people who talk among
+    themselves, and answer what the robot asks them; `none` leaves the table alone.
     """
 
     human: HumanKind = "appendix-b"
+    people: int = 2
+    """Number of people of a `party`, 1 to 8."""
     seed: int = 0
     """Seed of the person's reaction times and of the faults of perception."""
     jitter: Seconds = 0.03
@@ -85,3 +89,5 @@ class SimulationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         positive(self, ("frame",), "simulation.")
         not_negative(self, ("entrance", "jitter"), "simulation.")
         shares(self, ("reciprocity",), "simulation.")
+        if not 1 <= self.people <= len(NAMES):
+            raise ValueError(f"simulation.people must be 1 to {len(NAMES)}, not {self.people}")

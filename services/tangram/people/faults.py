@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.units import Seconds, Vector
 from engage_hri.schemas.world import Entity
-from engage_hri.services.tangram.people.chance import Chance
+from engage_hri.services.simulation.chance import Chance
 from engage_hri.services.tangram.people.config import PerceptionFaults
 from engage_hri.services.tangram.people.head import unit
 

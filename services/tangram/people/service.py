@@ -1,22 +1,24 @@
 """The simulated human at the tangram table, instead of cameras: publishes the world and what the person does."""
 
 import random
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from functools import partial
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.participants import PeerAlive
 from engage_hri.schemas.perception import HeadPose, Utterance, VoiceActivity
-from engage_hri.schemas.units import Seconds
-from engage_hri.schemas.world import World
+from engage_hri.schemas.units import Seconds, Vector
+from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus, Subscription
-from engage_hri.services.client.people.perceived_person import PerceivedActions
+from engage_hri.services.client.people.perceived_person import PerceivedActions, free_seat
 from engage_hri.services.client.people.shared_world import SharedWorld
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 from engage_hri.services.simulation.human import Human
 from engage_hri.services.simulation.listening import AttentiveHuman, ListeningHuman
+from engage_hri.services.simulation.party import NAMES, Party
+from engage_hri.services.simulation.still import show_company, table_world
 from engage_hri.services.tangram.people.appendix_b import misplacing_rules, rules
 from engage_hri.services.tangram.people.cameras import Cameras
 from engage_hri.services.tangram.people.config import SimulationConfig
@@ -45,6 +47,12 @@ async def simulate(
 
     habits: of the `stochastic` person.
     """
+    if config.human == "party":
+        tell_settings(bus, "simulation", config)
+        party = Party(NAMES[: config.people], random.Random(config.seed), bus.robot, bus.run)
+        party.begin(bus.now())
+        await show_company(bus, ready, _table_with(party.people), party)
+        return
     table = Table(tangram_table())
     human = _human(config, habits, bus.robot, random.Random(config.seed))
     person = PersonAtTable(human, table, robot=bus.robot, frame=config.frame, stamp=bus.stamp, life=bus.run)
@@ -74,6 +82,16 @@ async def simulate(
             for message in reports:
                 bus.publish(_key(message), _whole(message, shared, now) if isinstance(message, World) else message)
             perceived.follow(reports)
+
+
+def _table_with(people: Iterable[str]) -> World:
+    """The table with these people around it."""
+    entities = [each for each in table_world().entities if each.kind in ("object", "surface")]
+    seats: list[Vector] = []
+    for person in people:
+        seats.append(free_seat(seats))
+        entities.append(Entity(id=person, kind="person", position=seats[-1]))
+    return World(entities=tuple(entities))
 
 
 def _whole(world: World, shared: SharedWorld, now: Seconds) -> World:
@@ -118,7 +136,7 @@ def _human(config: SimulationConfig, habits: Habits, robot: str, chance: random.
         case "attentive":
             pieces = frozenset(piece.id for piece in table.pieces)
             return AttentiveHuman(table.person.id, pieces, robot, vary, asked)
-        case "none":
+        case "none" | "party":
             return Human((), robot, vary)
 
 

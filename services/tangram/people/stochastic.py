@@ -16,6 +16,7 @@ from engage_hri.schemas.footprints import SIDES, poses_touching
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.services.simulation.chance import Chance, Delays
 from engage_hri.services.simulation.human import (
     FACE,
     TABLE,
@@ -32,7 +33,6 @@ from engage_hri.services.simulation.human import (
 )
 from engage_hri.services.simulation.listening import COMES, GOES, moves
 from engage_hri.services.simulation.speech import THINKING, HeardSpeech, Hearing, speech
-from engage_hri.services.tangram.people.chance import Chance, Delays
 from engage_hri.services.tangram.people.habits import Habits
 from engage_hri.services.tangram.people.requests import is_request, requested_placement
 from engage_hri.services.tangram.table import TangramTable

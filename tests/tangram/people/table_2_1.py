@@ -6,7 +6,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.behaviors import EventKind
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.tangram.people.chance import Delays
+from engage_hri.services.simulation.chance import Delays
 
 
 class Row(Struct, frozen=True, kw_only=True):
