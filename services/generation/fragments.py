@@ -279,7 +279,8 @@ class Fragments:
                 performance.is_held = is_held
                 self._holds += 1
                 id = f"{performance.block_id}/hold-{self._holds}"
-                steer = SteerPerformance(id=id, to="hold" if is_held else "continue", block=performance.fragment.id)
+                to: Literal["hold", "continue"] = "hold" if is_held else "continue"
+                steer = SteerPerformance(id=id, to=to, block=performance.fragment.id, own=True)
                 self._tell(SendRequest(keys.BLOCK, steer))
 
     def _enforce_inhibitions(self, performance: FragmentPerformance, permits: Permits) -> None:
