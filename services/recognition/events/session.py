@@ -426,6 +426,9 @@ class Session:
     def _ask(self, person: PersonRecognition, event: OngoingEvent, wanted: Event) -> None:
         event.accept = wanted.accept or ACCEPT
         at = event.started
+        asked = [each for each in self._live.values() if each.kind == "adjacency_pair" and each.turn == event.turn]
+        for each in asked if event.turn and len(asked) > 1 else ():
+            each.is_to_several = True
         turn_end = self._ended_turns.get(event.turn) if event.turn else self.blocks.ended.get(event.block)
         person.talk.take(at, lambda talk: talk.robot_asks(event))
         if turn_end is None:
@@ -476,8 +479,14 @@ class Session:
             case "aborted":
                 self._aborted_turns[signal.turn] = at
                 self._closes(signal.turn)
-                self._apply_to_addressees(signal.actor, at, lambda person: person.abort(at, turn=signal.turn))
+                self._abort(signal.actor, at, signal.turn)
         self._writer.effects.append(TurnOutcome(id=request.id, at=self._writer.stamp(at)))
+
+    def _abort(self, actor: str, at: Seconds, turn: str) -> None:
+        """End the pairs of a turn that was cut off; first that of who has cut in, which may answer for all."""
+        here = [person for person in self.persons.values() if person.presence.here and actor in ("", person.id)]
+        for person in sorted(here, key=lambda each: not each.talk.takes_floor):
+            self._people.apply(person.id, at, lambda person: person.abort(at, turn=turn))
 
     def _apply_to_addressees(self, actor: str, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
         """Apply a step to a known person, or to all (actor: empty)."""
