@@ -59,7 +59,7 @@ class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event",
     """Adjacency pair: the action that answered. Of a failed one: the answer that came after the limit, before anybody
     began another turn; `delay` is then that of this answer."""
     answered_by: str = ""
-    """Adjacency pair of the robot that was asked of several people, or `preempted`: the person who answered. A pair that
+    """Adjacency pair of the robot that was asked of several people, or `preempted`: the person who answered. One that
     another of those who were asked has answered is `succeeded`, too, but counts for nobody."""
     confidence: Probability = 1.0
     """Least confidence of the observations by which it began and was answered; so far, when `started`."""

@@ -412,7 +412,7 @@ class Fragments:
 
     def _heard_in(self, turn: TurnPlan) -> Discourse:
         """The discourse at the start of `turn`. A backchannel is said in the other's turn, and changes nothing."""
-        return self._discourse if turn.backchannel else self._discourse.in_turn(turn.turn, turn.addressee)
+        return self._discourse if turn.backchannel else self._discourse.in_turn(turn.turn, turn.addressees)
 
     # -- references, chosen again while their fragments go on -----------------------------------------------------
 
@@ -495,6 +495,8 @@ class Fragments:
             return
         self._signals += 1
         id = f"turn-aborted-{self._signals}"
-        signal = TurnSignal(id=id, turn=aborted.turn, signal="aborted", actor=aborted.addressee)
+        signal = TurnSignal(
+            id=id, turn=aborted.turn, signal="aborted", actor=aborted.addressee if aborted.is_to_one else ""
+        )
         request = SignalTurn(id=f"{self._session}/{id}", signal=signal, at=Stamp(self._clock.name, now))
         self._tell(SendRequest(keys.TURN, request))

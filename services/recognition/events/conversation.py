@@ -122,6 +122,10 @@ class Conversation:
         else:
             if self.robot_holds_floor:
                 self._writer.interject(self.id, at, "interruption", at)
+            elif (said := self._scene.robot_spoken) is not None and said.since <= at:
+                # Said to the robot while it speaks to others: it has no other reading.
+                self._writer.interject(self.id, at, "open", at)
+                self._writer.interject(self.id, at, "interruption", at)
             self._human_turn(at, "speak", confidence)
 
     def falls_silent(self, at: Seconds) -> None:
