@@ -8,7 +8,6 @@ from engage_hri.schemas.behaviors import TurnSignal
 from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
 from engage_hri.services.recognition.events.scene import Worded
 from engage_hri.services.recognition.statistics.tally import EventTally
-from tests.random_cases import share_of
 from tests.recognition.observations import ROBOT, Log, request_event, stamp
 
 PEOPLE = ("ann", "bob", "cy", "dan")
@@ -49,7 +48,7 @@ def asked(people: tuple[str, ...], speeches: list[tuple[float, float, str]]) -> 
     return log.events
 
 
-@pytest.mark.parametrize("seed", range(share_of(1000, 100)))
+@pytest.mark.parametrize("seed", range(200))
 def test_the_first_answer_is_that_of_all(seed: int) -> None:
     chance = random.Random(seed)
     people = tuple(chance.sample(PEOPLE, chance.randint(2, 4)))
