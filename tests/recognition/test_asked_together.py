@@ -5,7 +5,7 @@ import random
 import pytest
 
 from engage_hri.schemas.behaviors import TurnSignal
-from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
+from engage_hri.schemas.recognition import ConnectionEvent, Interjection, SignalTurn
 from engage_hri.services.recognition.events.scene import Worded
 from engage_hri.services.recognition.statistics.tally import EventTally
 from tests.recognition.observations import ROBOT, Log, request_event, stamp
@@ -74,6 +74,22 @@ def test_the_first_answer_is_that_of_all(seed: int) -> None:
         assert decided.state == ("succeeded" if by in people else "preempted")
         assert life[-1].state == ("completed" if by in people else "preempted")
         assert (asked_one == by) == (life[-1].duration is not None)
+
+
+def test_who_is_announced_after_the_first_word_is_addressed_too() -> None:
+    log = Log("ann", "bob", adjacency_pair_limit=LIMIT)
+    for number, one in enumerate(("ann", "bob")):
+        request = request_event("adjacency_pair", ASKS, request=f"t/{one}", block="t", turn="t", responder=one)
+        log.feed(request, ASKS)
+        if number == 0:
+            log.begins(ROBOT, "speak", ASKS, behavior="t:s")
+    said_to = log.session.scene.robot_spoken
+    assert said_to is not None
+    assert said_to.to == {"ann", "bob"}
+    log.looks("bob", ROBOT, 2.2)
+    log.begins("bob", "speak", 2.5)
+
+    assert [(each.actor, each.reading) for each in log.effects if isinstance(each, Interjection)] == [("bob", "open")]
 
 
 def test_only_who_answers_has_succeeded_in_the_statistics() -> None:
