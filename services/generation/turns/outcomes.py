@@ -136,8 +136,8 @@ class TurnEvents:
         self._turn_of[block] = turn
 
     def feed(self, event: ConnectionEvent, now: Seconds) -> None:
-        # An event that is first heard of in a later state belongs to an earlier performance under the same id, unless a
-        # request of this one has adopted it (decision 0187).
+        # An event that is first heard of in a later state belongs to an earlier performance under the same id,
+        # unless a request of this one has adopted it (decision 0187).
         is_known = event.id in self._events
         is_adopted = event.state == "succeeded" and (event.cause == "human" or event.retold)
         if event.block in self._turn_of and (event.state == "started" or is_known or is_adopted):
