@@ -6,9 +6,10 @@ from unittest import mock
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from engage_hri.schemas.recognition import Floor, FloorSpeech
 from engage_hri.services.generation.head import arbiter, maintenance_policy, response_policy
-from tests.generation.head_table import TICK, TIMES, HeadTable
-from tests.generation.heads import Stage, act, event, inhibition, statistics, world
+from tests.generation.head_table import LISTENS_AFTER, TICK, TIMES, HeadTable
+from tests.generation.heads import AT, Stage, act, event, inhibition, statistics, world
 from tests.random_cases import share_of
 
 
@@ -16,7 +17,7 @@ class Both:
     """One story told to the arbiter and to the table."""
 
     def __init__(self) -> None:
-        self.stage = Stage()
+        self.stage = Stage(listen_after=LISTENS_AFTER)
         self.table = HeadTable()
         self.events: list[str] = []
         self.see()
@@ -43,6 +44,12 @@ class Both:
         self.table.act(acting)
         self.table.ask()
         self.stage.feed(act(ends=not acting))
+
+    def speak(self, speaks: bool) -> None:
+        self.table.speak(speaks)
+        self.table.ask()
+        speeches = (FloorSpeech(actor="human", since=AT),) if speaks else ()
+        self.stage.feed(Floor(at=AT, speeches=speeches))
 
     def direct(self, target: str) -> None:
         self.table.direct(len(self.events), target)
@@ -89,6 +96,7 @@ HAPPENINGS = st.sampled_from(
         *[("hand", fast) for fast in (True, False)],
         *[("person", seen) for seen in (True, False)],
         *[("act", acting) for acting in (True, False)],
+        *[("speak", speaks) for speaks in (True, False)],
         *[("direct", target) for target in ("piece", "other", "human")],
         *[("decide", age, state) for age in (0, 1) for state in ("succeeded", "completed", "failed")],
         *[("inhibit", *lease) for lease in (("release", ""), ("hold", ""), ("target", "piece"), ("", ""))],
