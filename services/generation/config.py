@@ -63,8 +63,8 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     barge_in: Seconds | None = None
     """Seconds of voice after which who speaks into the robot's turn takes the floor, though recognition has not yet
     decided what it is. None: the robot waits for that in silence, and a laugh never takes the floor."""
-    listen_after: Seconds | None = 0.6
-    """Seconds of a speech after which the silent robot looks at who speaks. None: it never does for that reason."""
+    listens: bool = True
+    """Whether the silent robot looks at who speaks, as a listener does."""
     decision_patience: Seconds = 8.0
     """Seconds after a block's end for which undecided connection events may delay the fragment's outcome. Ours."""
     glance_factor: float = 1.0
@@ -85,8 +85,7 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
                 f"pointing_reliability {pointing} + phrase_reliability {self.phrase_reliability} reaches 1: "
                 'a channel cannot be certain; lower one or set channel = "independent"'
             )
-        given = [name for name in ("barge_in", "listen_after") if getattr(self, name) is not None]
-        positive(self, (*given, "decision_patience", "glance_factor"))
+        positive(self, (*(("barge_in",) if self.barge_in is not None else ()), "decision_patience", "glance_factor"))
         not_negative(self, ("seconds_per_head_degree", "seconds_per_arm_degree", "seconds_per_word", "wait_weight"))
         if self.gaze_half_angle is not None and not 0 < self.gaze_half_angle < pi / 2:
             raise ValueError(f"gaze_half_angle must be between 0 and pi/2 radians, not {self.gaze_half_angle}")

@@ -9,11 +9,9 @@ from dataclasses import dataclass, field
 TICK = 0.125
 TIMES = {
     "DWELL": 0.25, "HAND_ONSET": 0.25, "HAND_STILLNESS": 0.75, "RESPONSE_HOLD": 0.75, "GLANCE_DURATION": 1.0,
-    "MTBCE_PRIOR": 5.75,
+    "MTBCE_PRIOR": 5.75, "ONSET": 0.625, "STAYS": 1.0,
 }  # fmt: skip
 """Times of both sides, in place of those of the arbiter."""
-LISTENS_AFTER, STAYS = 0.625, 1.0
-"""Seconds of a speech after which the head turns to the speaker, and for which it stays after the speech."""
 FACE_LOST = 2.0
 """Seconds for which the head stays with a face that is out of sight."""
 ROWS = ("inhibition", "fragment", "glance", "response", "hands", "face")
@@ -132,10 +130,10 @@ class HeadTable:
         return wants
 
     def _listens(self, there: bool) -> bool:
-        if there and self.speaks_since is not None and self.now - self.speaks_since >= LISTENS_AFTER:
+        if there and self.speaks_since is not None and self.now - self.speaks_since >= TIMES["ONSET"]:
             self.listens_until = float("inf")
         elif self.speaks_since is None and self.listens_until == float("inf"):
-            self.listens_until = self.now + STAYS
+            self.listens_until = self.now + TIMES["STAYS"]
         if not there or (self.listens_until is not None and self.now >= self.listens_until):
             self.listens_until = None
         return self.listens_until is not None

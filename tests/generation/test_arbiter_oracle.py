@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.schemas.recognition import Floor, FloorSpeech
-from engage_hri.services.generation.head import arbiter, maintenance_policy, response_policy
-from tests.generation.head_table import LISTENS_AFTER, TICK, TIMES, HeadTable
+from engage_hri.services.generation.head import arbiter, listening_policy, maintenance_policy, response_policy
+from tests.generation.head_table import TICK, TIMES, HeadTable
 from tests.generation.heads import AT, Stage, act, event, inhibition, statistics, world
 from tests.random_cases import share_of
 
@@ -17,7 +17,7 @@ class Both:
     """One story told to the arbiter and to the table."""
 
     def __init__(self) -> None:
-        self.stage = Stage(listen_after=LISTENS_AFTER)
+        self.stage = Stage()
         self.table = HeadTable()
         self.events: list[str] = []
         self.see()
@@ -114,7 +114,7 @@ def test_whatever_happens_the_owner_and_the_shifts_are_those_of_the_table(
     story: list[tuple[tuple[object, ...], int]],
 ) -> None:
     with ExitStack() as changed:
-        for module in (arbiter, maintenance_policy, response_policy):
+        for module in (arbiter, listening_policy, maintenance_policy, response_policy):
             times = {name: seconds for name, seconds in TIMES.items() if hasattr(module, name)}
             changed.enter_context(mock.patch.multiple(module, **times))
         both = Both()

@@ -148,7 +148,7 @@ def test_an_answer_to_a_look_goes_before_and_an_inhibition_holds_the_head() -> N
 
 
 def test_it_can_be_switched_off() -> None:
-    stage = company(listen_after=None)  # type: ignore[arg-type]
+    stage = company(listens=False)
     speak(stage, 10.0, "ben")
     stage.until(14.0)
 

@@ -91,7 +91,7 @@ class Arbiter:
     def __init__(self, robot: str, config: GenerationConfig) -> None:
         self._config = config
         self._responses = ResponsePolicy(robot)
-        self._listening = ListeningPolicy(robot, config.listen_after)
+        self._listening = ListeningPolicy(robot)
         self._hands = HandWatch(robot)
         self._faces = FaceWatch(robot)
         self._glances = GlanceWatch(config)
@@ -132,7 +132,8 @@ class Arbiter:
                 if actor:
                     self._people.hear(actor, now)
             case Floor():
-                self._listening.feed(observation, now)
+                if self._config.listens:
+                    self._listening.feed(observation, now)
             case ConnectionEvent():
                 self._listening.feed(observation, now)
                 self._glances.feed(observation, now)

@@ -9,6 +9,8 @@ from engage_hri.schemas.fragments import Claim
 from engage_hri.schemas.recognition import ConnectionEvent, Floor
 from engage_hri.schemas.units import Seconds
 
+ONSET: Seconds = 0.6
+"""Time for which somebody has to speak until the robot looks there: an "uh-huh" is shorter. Ours."""
 STAYS: Seconds = 1.0
 """Time after a speech for which the robot still looks at the speaker: most who pause go on. Ours."""
 
@@ -16,10 +18,8 @@ STAYS: Seconds = 1.0
 class ListeningPolicy:
     """People who speak, and those who were asked something."""
 
-    def __init__(self, robot: str, after: Seconds | None) -> None:
-        """after: how long somebody has to speak until the robot looks there; None: it never does."""
+    def __init__(self, robot: str) -> None:
         self._robot = robot
-        self._after = after
         self._speaking: dict[str, Seconds] = {}
         """Since when each speaks, as it was heard here; the first first."""
         self._asked: dict[str, str] = {}
@@ -46,18 +46,18 @@ class ListeningPolicy:
     @property
     def deadline(self) -> Seconds | None:
         """Time of the next change of the claim without a message."""
-        due = [since + self._after for since in self._speaking.values()] if self._after is not None else []
+        due = [since + ONSET for since in self._speaking.values()]
         due += [self._until] if self._until is not None else []
         return min((each for each in due if each > self._seen), default=None)
 
     def claim(self, now: Seconds, present: Collection[str]) -> Claim | None:
         """present: people whose faces are to be seen."""
         self._seen = now
-        if self._after is None or self._robot in self._speaking:
+        if self._robot in self._speaking:
             self._speaker, self._until = "", None
             return None
         draws = [who for who in self._asked.values() or present if who in present]
-        heard = [who for who, since in self._speaking.items() if who in draws and now >= since + self._after]
+        heard = [who for who, since in self._speaking.items() if who in draws and now >= since + ONSET]
         if heard:
             self._speaker, self._until = heard[0], None
         elif self._speaker not in draws:
