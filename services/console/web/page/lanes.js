@@ -125,7 +125,9 @@ export function floorLanes(panel) {
       context.fillStyle = color(speech.taken ? "--back" : "--speech");
       context.fillRect(from, middle - size * 0.34, to - from, size * 0.68);
       context.fillStyle = color("--ink");
-      if (to > view.names) caption(context, said(speech, state), Math.max(from, view.names), to, middle, next.get(index) ?? width, true);
+      const [begins, room] = [Math.max(from, view.names), next.get(index) ?? width];
+      const text = fitting(context, said(speech, state), Math.max(to - begins - 8, room - to - 10));
+      if (to > view.names && text.length > 3) caption(context, text, begins, to, middle, room, true);
       next.set(index, from);
     }
     context.restore();
@@ -138,7 +140,7 @@ const speakers = (state) => [...new Set([state.robot, ...[...state.measures.keys
 
 function said({ to, taken, words }, { robot }) {
   const whom = to.length ? `to ${to.map((each) => (each === robot ? "the robot" : each)).join(" and ")}` : "";
-  return [words && `“${words}”`, taken || whom].filter(Boolean).join(" ");
+  return [taken || whom, words && `“${words}”`].filter(Boolean).join(": ");
 }
 
 function tellFloor(state) {
