@@ -1,9 +1,19 @@
 """The head of a robot among people: whom it looks at while they speak and it is silent."""
 
+import asyncio
+
 import pytest
 
+from engage_hri import perceive
+from engage_hri.schemas.fragments import HeadOwner
 from engage_hri.schemas.recognition import Floor, FloorSpeech
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.robot import Robot, connect
+from engage_hri.services.commandline.embedding import services
+from engage_hri.services.commandline.shell import roster
+from engage_hri.services.commandline.shell.config import load
+from engage_hri.services.runtime.service import running
 from tests.generation.heads import AT, Stage, event, inhibition
 
 PEOPLE = tuple(
@@ -153,3 +163,43 @@ def test_it_can_be_switched_off() -> None:
     stage.until(14.0)
 
     assert looks(stage) == []
+
+
+# -- whole robots --------------------------------------------------------------------------------------------------
+
+
+async def owners_from(robot: Robot, seconds: float) -> list[tuple[float, str]]:
+    """Targets of the head in the next seconds, each with the time from now."""
+    began, found = robot.now(), list[tuple[float, str]]()
+    with robot.head_owners() as owners:
+        while (left := began + seconds - robot.now()) > 0 and (told := await owners.next(left)) is not None:
+            assert isinstance(told, HeadOwner)
+            if not found or found[-1][1] != told.owner.target:
+                found.append((robot.now() - began, told.owner.target))
+    return found
+
+
+async def test_a_whole_robot_turns_to_who_speaks_but_not_while_it_waits_for_another_ones_answer(
+    hub: MemoryHub,
+) -> None:
+    config = load(settings=["simulation.human=none"])
+    async with (
+        running(hub, services(config, *roster.ROBOT, "simulation")),
+        connect(hub=hub) as robot,
+        perceive("ann", hub=hub, position=(1.3, 0.4, 1.2)) as ann,
+        perceive("ben", hub=hub, position=(1.3, -0.4, 1.2)) as ben,
+    ):
+        await ann.look_at(ann.robot)
+        asked = {"turn_status": "full", "addressee": "ann", "parts": [{"say": "Ann, which piece is yours?"}]}
+        await robot.perform(asked)
+        talking = asyncio.create_task(ben.say("so I told her that we would be late", to=["ann"], seconds=2.5))
+        assert {target for _, target in await owners_from(robot, 2.5)} == {"ann"}  # she has 4 s
+        await talking
+        await asyncio.sleep(6.0)
+
+        talking = asyncio.create_task(ben.say("and then we missed the train", to=["ann"], seconds=2.5))
+        (_, first), (turned, second), (back, third) = await owners_from(robot, 6.0)
+        await talking
+        assert (first, second, third) == ("ann", "ben", "ann")
+        assert 0.3 <= turned <= 0.8
+        assert 3.0 <= back <= 4.5
