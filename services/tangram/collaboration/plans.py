@@ -20,6 +20,7 @@ from engage_hri.services.tangram.collaboration.fragments import (
     fragment,
     request,
 )
+from engage_hri.services.tangram.collaboration.placement import has_been_placed
 from engage_hri.services.tangram.collaboration.task import Goal, Instruction, check
 from engage_hri.services.tangram.table import TangramTable
 
@@ -125,7 +126,7 @@ class Manager:
         self._greeted: dict[str, int] = {}
         """Visit for which each person was greeted."""
         self._ignored = 0
-        """Number of requests in a row that nobody followed."""
+        """Number of requests in a row after which nobody laid anything anywhere."""
 
     def welcome(self) -> Plan[None]:
         """Wait for a person, and let them settle. Who is there then is greeted by the plan."""
@@ -158,7 +159,7 @@ class Manager:
         return cast("tuple[Attendee, ...]", guests)
 
     def has_lost(self) -> Plan[bool]:
-        """Tell whether the person follows no request, and attends to the robot no more, though they are there."""
+        """Tell whether the person does nothing, and attends to the robot no more, though they are there."""
         levels = [guest.level for guest in (yield from self._company()) if guest.id == self._person]
         return self._ignored >= ATTEMPTS and levels == ["disengaged"]
 
@@ -194,9 +195,10 @@ class Manager:
             yield from self._meet()
             yield Perform(self._request(request_id, instruction, how))
             placed = yield AwaitPlacement(instruction.wanted.piece, pieces, self.config.placement)
-            self._ignored = 0 if placed else self._ignored + 1
             yield Pause(SETTLE)
-            pieces = yield from self.observe()
+            before, pieces = pieces, (yield from self.observe())
+            has_moved_any = any(has_been_placed(each.id, before, pieces) for each in pieces)
+            self._ignored = 0 if placed or has_moved_any else self._ignored + 1
             verdict = check(instruction, pieces)
             if verdict.right:
                 return True
@@ -284,7 +286,10 @@ def task(manager: Manager) -> Plan[None]:
             if (yield from manager.has_lost()):
                 yield from manager.say("let-go", ("You have other things to do. Thank you for playing, goodbye.",))
                 return
-    finished = "Look, we made an anchor." if not given_up else "Look, we almost made an anchor."
+    finished = "Look, we made an anchor."
+    if given_up:
+        is_begun = len(manager.goal.placed(pieces)) > 1
+        finished = "Look, we almost made an anchor." if is_begun else "Let us make the anchor another time."
     yield from manager.say("finished", (finished,), look=False)
     yield from manager.say("goodbye", ("Thanks for playing. That was fun, goodbye.",), look=False)
     yield from manager.farewell()

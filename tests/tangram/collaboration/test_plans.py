@@ -259,6 +259,32 @@ def test_who_follows_no_request_and_attends_no_more_is_let_go(level: EngagementL
     assert len([it for it in performed if it.id.startswith("move-1")]) == 3  # only after three requests
 
 
+def test_who_has_made_a_part_of_it_hears_so() -> None:
+    player = Player()
+    place = player._place
+
+    def place_two(piece: str) -> bool:
+        return place(piece) if len(player.performed) < 10 else False
+
+    player._place = place_two  # type: ignore[method-assign]
+    performed = player.play(task(manager()))
+
+    assert spoken(performed[-2]) == "Look, we almost made an anchor."
+
+
+def test_who_lays_another_piece_than_the_one_asked_for_is_not_let_go() -> None:
+    player = Player(level="disengaged")
+
+    def place_another(piece: str) -> bool:
+        other = player.pieces["trapezoid"]
+        player.pieces["trapezoid"] = replace(other, position=(other.position[0] + 0.1, *other.position[1:]))
+        return False
+
+    player._place = place_another  # type: ignore[method-assign]
+
+    assert "let-go" not in {it.id for it in player.play(task(manager()))}
+
+
 def test_who_comes_is_greeted_once_each_time() -> None:
     def others(performed: int) -> tuple[Attendee, ...]:
         """Ben passes by. Cem attends, is away for a while, and comes again."""
@@ -314,7 +340,7 @@ def test_the_task_gives_a_piece_up_after_its_attempts_and_says_so() -> None:
 
     performed = player.play(task(manager()))
 
-    assert spoken(performed[-2]) == "Look, we almost made an anchor."
+    assert spoken(performed[-2]) == "Let us make the anchor another time."
     assert {it.id.partition("-again")[0] for it in performed if "again" in it.id} == {"move-1", "move-2"}
 
 
