@@ -247,7 +247,7 @@ def test_step_19_is_accepted_as_the_source_has_it() -> None:
     triangle, trapezoid = final.entity("purple-triangle"), final.entity("trapezoid")
 
     assert relation(triangle, trapezoid) == Relation("purple-triangle", "top right", "trapezoid")
-    assert not [id for id in record.outcomes if id.endswith(("fix", "again"))]
+    assert not [id for id in record.outcomes if id.endswith(("fix", "help", "again"))]
 
 
 def test_every_fragment_is_done_and_nothing_is_warned_of() -> None:
@@ -306,4 +306,4 @@ def test_the_task_finishes_the_figure_with_a_person_who_listens() -> None:
     record = played(human="listening", mode="task")
 
     assert words(record, "finished") == "Look, we made an anchor."
-    assert not [id for id in record.outcomes if "fix" in id or "again" in id]
+    assert not [id for id in record.outcomes if "fix" in id or "help" in id]
