@@ -110,6 +110,12 @@ class Conversation:
     def holds_floor(self) -> bool:
         return self.speaks_since is not None
 
+    @property
+    def is_under_way(self) -> bool:
+        """True if one holds the floor, or a pair, a sign or a backchannel is open."""
+        is_open = self.pair.event is not None or self.robot_backchannel.event is not None or self._cut_into
+        return self.robot_speaks_now or self.holds_floor or self._sign is not None or bool(is_open)
+
     def speaks(self, at: Seconds, confidence: Probability = 1.0) -> None:
         if self.speaks_since is not None:
             return

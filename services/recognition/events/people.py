@@ -4,7 +4,7 @@ A step concerns one person, or all who are here. People who have gone have no op
 while, in case they come back.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 
 from engage_hri.schemas.units import Seconds
@@ -31,8 +31,8 @@ class People:
         """`scene.unknown` when the deadlines of those who were asked were last updated."""
         self.touched: set[str] = set()
         """Persons whose contact with the robot may have changed since somebody emptied this."""
-        self._speech = 0
-        """`scene.speech` when the deadlines of all were last updated."""
+        self._silences = 0
+        """`scene.silences` when the deadlines of all were last updated."""
         self._scene = scene
         self._config = config
         self._writer = writer
@@ -52,13 +52,13 @@ class People:
     def see(self, world: World, at: Seconds) -> None:
         """Take a view of the world: people in it are here, those that are missing now may have gone."""
         before = self._scene.people_in_world
-        self._scene.see(world, at)
+        is_news = self._scene.see(world, at)
         self._scene.forget_others(at - FORGOTTEN_AFTER)
-        for id in sorted(self._scene.people_in_world):
-            self.person(id)
-        for id in sorted(before ^ self._scene.people_in_world):
-            self._note(self.persons[id], at)
-        self.apply_to_all(at, lambda person: None)  # an entity may have become known as an object
+        if before != self._scene.people_in_world:
+            for person in [self.person(id) for id in sorted(before ^ self._scene.people_in_world)]:
+                self._note(person, at)
+        if is_news:
+            self._looks_may_direct(at)
 
     def _note(self, person: PersonRecognition, at: Seconds) -> None:
         """Note a sign of the person, or its leaving, at `at`."""
@@ -126,8 +126,16 @@ class People:
 
     def apply_to_all(self, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
         """Apply a step to all who are here."""
-        self._speech = self._scene.speech
-        for person in list(self._here.values()):
+        self._apply_to(list(self._here.values()), at, step)
+
+    def apply_to_involved(self, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
+        """Apply a step to those with whom something goes on: one that changes nothing for all others."""
+        self._apply_to([person for person in self._here.values() if person.is_involved], at, step)
+
+    def _apply_to(
+        self, persons: Iterable[PersonRecognition], at: Seconds, step: Callable[[PersonRecognition], object]
+    ) -> None:
+        for person in persons:
             self._apply(person, at, step)
         self._follow_answers(at)
         self._follow_speech(at)
@@ -144,9 +152,16 @@ class People:
                 self._apply(self.persons[taken_up.asked], at, partial(_answered_by_other, taken_up))
 
     def _follow_speech(self, at: Seconds) -> None:
-        """Update all deadlines if speech has begun or ended: while one speaks, looks of the others direct nothing."""
-        if self._speech != self._scene.speech:
-            self.apply_to_all(at, lambda person: None)
+        """Take the silence of the others: while one speaks, looks of all but that one direct nothing."""
+        if self._silences != self._scene.silences:
+            self._silences = self._scene.silences
+            self._looks_may_direct(at)
+
+    def _looks_may_direct(self, at: Seconds) -> None:
+        """Update the deadlines of those whose looks may direct the robot's now, for what all share has changed."""
+        for person in list(self._here.values()):
+            if person.gaze.targets and not person.gaze.spent:
+                self._apply(person, at, lambda person: None)
 
     def _apply(self, person: PersonRecognition, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
         """Apply a step to one person; a bug that shows in it does not affect the others."""

@@ -92,6 +92,12 @@ class PersonRecognition:
         yield self._look_directs_at, self._look_directs
         yield from ((one.until, self._goes_on_too_long) for one in self._doing.values())
 
+    @property
+    def is_involved(self) -> bool:
+        """True if something goes on between the person and the robot, or has just been, that its deeds may change."""
+        has_gaze = self.facial.event is not None or self.directed or self._robot_directed
+        return bool(has_gaze) or self.talk.is_under_way
+
     def pass_time(self, at: Seconds) -> None:
         """Take the first step that is due at `at`. There is none if something that all share has put it off."""
         for due, step in self._timed_steps:

@@ -175,7 +175,9 @@ class Session:
                 self._cancel(observation, at)
             case SyncPointProgress(block=block):
                 name = self.blocks.realised(block, observation.behavior, observation.sync, at)
-                self._people.apply_to_all(at, lambda person: person.point_realised(block, name, at))
+                waiting = {event.responder for event in self._live.values() if event.block == block}
+                for id in waiting & self.persons.keys():
+                    self._people.apply(id, at, lambda person: person.point_realised(block, name, at))
             case BlockProgress(block=str() as block, progress="start"):
                 self._block_begins(block, at)
             case BlockProgress(block=str() as block, progress="end"):
@@ -184,7 +186,7 @@ class Session:
                 self._robot_is_heard(bool(said), at)
             case HeadOwner(owner=owner):
                 self.scene.head_owner = owner
-                self._people.apply_to_all(at, lambda person: person.head_owner_changed(at))
+                self._people.apply_to_involved(at, lambda person: person.head_owner_changed(at))
             case World():
                 self._people.see(observation, at)
             case Covered():
@@ -298,9 +300,12 @@ class Session:
                 speaks = any(action == "speak" for _, action in self._robot_actions)
                 if self.scene.robot_speaks_since is not None and not speaks:
                     self.scene.robot_falls_silent(at)
-                    self._tell("", at, lambda talk: talk.robot_falls_silent(at))
+                    self._ends_in_talk(at, lambda talk: talk.robot_falls_silent(at))
             case "nod" | "shake" | "point":
-                self._tell("", at, lambda talk: talk.robot_gesture_ends(ended.action, at))
+                self._ends_in_talk(at, lambda talk: talk.robot_gesture_ends(ended.action, at))
+
+    def _ends_in_talk(self, at: Seconds, step: Step) -> None:
+        self._people.apply_to_involved(at, lambda person: person.talk.take(at, step))
 
     def _understand(self, words: Worded, at: Seconds) -> None:
         """Take the words of a person's speech, and to whom perception says that they are."""
@@ -336,7 +341,7 @@ class Session:
                 self._robot_ends(ended, at)
 
     def _robot_gaze_changed(self, at: Seconds) -> None:
-        self._people.apply_to_all(at, lambda person: person.gaze_changed(at))
+        self._people.apply_to_involved(at, lambda person: person.gaze_changed(at))
 
     # -- requests -----------------------------------------------------------------------------------------------
 
@@ -501,7 +506,7 @@ class Session:
         self.blocks.ended[block] = at
         self.scene.listening_blocks.pop(block, None)
         self._robot_stops(at, f"{block}:")
-        self._people.apply_to_all(at, lambda person: person.block_ended(block, at, aborted=aborted))
+        self._people.apply_to_involved(at, lambda person: person.block_ended(block, at, aborted=aborted))
         answered = self._answering_blocks.pop(block, None)
         if answered is not None:
             self._tell(answered, at, lambda talk: talk.pair.answered_block_ended(at))
