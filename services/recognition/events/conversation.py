@@ -66,6 +66,8 @@ class Conversation:
     @property
     def deadlines(self) -> tuple[Seconds | None, ...]:
         """Times of the `timed_steps`."""
+        if self.pair.event is None and self._sign is None and self.robot_backchannel.event is None:
+            return ()
         return self._sign_deadline, self.robot_backchannel.deadline, self._pair_deadline
 
     @property
@@ -79,7 +81,9 @@ class Conversation:
     def _pair_deadline(self) -> Seconds | None:
         """Deadline of the pair; None while speech of anybody that began in time may yet turn out to be the answer."""
         at, speeches = self.pair.deadline, self._sign.speeches if self._sign is not None else []
-        began_in_time = at is not None and any(in_time(speech.since, at) for speech in speeches)
+        if at is None:
+            return None
+        began_in_time = any(in_time(speech.since, at) for speech in speeches)
         if began_in_time and self.pair.may_be_answered_with("speak"):
             return None
         question = self.pair.question

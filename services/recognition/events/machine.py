@@ -211,6 +211,8 @@ class EventWriter:
             del self._spoken[id]
 
     def _words_of(self, event: OngoingEvent) -> str:
+        if not event.spoken:
+            return ""
         pair = (event.initiator, event.responder)
         texts = (self._texts.get((actor, speech), "") for speech in event.spoken for actor in pair)
         return " ".join(filter(None, texts))

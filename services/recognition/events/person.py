@@ -75,10 +75,13 @@ class PersonRecognition:
     @property
     def deadline(self) -> Seconds | None:
         """Time of the next step that is due by itself, unless an input comes before; then call `pass_time`."""
-        times = [self.gaze.deadline, self.presence.deadline, self.facial.deadline, self._look_directs_at]
-        times += self.talk.deadlines
-        times += [one.deadline for one in self.directed]
-        times += [one.until for one in self._doing.values()]
+        times = [self.presence.deadline, self.facial.deadline, *self.talk.deadlines]
+        if self.gaze.targets:
+            times += (self.gaze.deadline, self._look_directs_at)
+        for directed in self.directed:
+            times.append(directed.deadline)
+        for doing in self._doing.values():
+            times.append(doing.until)
         return min([at for at in times if at is not None], default=None)
 
     @property
@@ -218,10 +221,15 @@ class PersonRecognition:
     @property
     def contact(self) -> Probability | None:
         """Contact with the robot now, from 0 to 1; None: nobody has told where the person looks."""
-        together = any(each.is_shared for each in self.gaze_machines())
-        if self.presence.here and (self.on_robots_face or together or self.talk.speaks_to_robot):
+        targets = self.gaze.targets
+        if self.presence.here and (
+            self._scene.robot in targets
+            or self.talk.speaks_to_robot
+            or self.facial.is_shared
+            or any([one.is_shared for one in self.directed])
+        ):
             return 1.0
-        return None if self.gaze.since == 0.0 and not self.gaze.targets else 0.0
+        return None if self.gaze.since == 0.0 and not targets else 0.0
 
     @property
     def _face(self) -> str:
@@ -332,11 +340,12 @@ class PersonRecognition:
 
     def forget_idle(self, at: Seconds) -> None:
         """Drop finished directed gazes, and remember those of the robot for a while."""
-        self._robot_directed = [past for past in self._robot_directed if self._is_recent(past, at)]
-        for one in self.directed:
-            if one.state == IDLE and one.by_robot:
+        if self._robot_directed:
+            self._robot_directed = [past for past in self._robot_directed if self._is_recent(past, at)]
+        for one in [one for one in self.directed if one.state == IDLE]:
+            self.directed.remove(one)
+            if one.by_robot:
                 self._robot_directed.append(_Directed(one.objects, at))
-        self.directed = [one for one in self.directed if one.state != IDLE]
 
     def point_realised(self, block: str, name: str, at: Seconds) -> None:
         """Take a realised sync point of a block of the robot: time limits may run from there."""

@@ -107,6 +107,8 @@ class Session:
 
     def contacts(self) -> dict[str, Probability | None]:
         """Contact with each person for whom it may have changed since the last call."""
+        if not self._people.touched:
+            return {}
         touched, self._people.touched = self._people.touched, set()
         return {id: self.persons[id].contact for id in touched if id in self.persons}
 
@@ -120,7 +122,7 @@ class Session:
     @property
     def deadline(self) -> Seconds | None:
         """Time at which `advance` has something to do, unless an observation comes first."""
-        gaze, people = self.scene.gaze.deadline, self._people.deadline
+        gaze, people = self.scene.gaze.deadline, self._people.agenda.earliest
         return people if gaze is None or (people is not None and people < gaze) else gaze
 
     def advance(self, now: Seconds) -> list[Effect]:
@@ -209,6 +211,8 @@ class Session:
                 self._writer.publish(event, "lost", at)
 
     def _take(self) -> list[Effect]:
+        if not self._writer.effects:
+            return []
         for mishap in [effect for effect in self._writer.effects if isinstance(effect, Mishap)]:
             self._lose_untold(mishap.actor, mishap.at)
         effects = self._writer.take()
