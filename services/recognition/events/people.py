@@ -4,7 +4,7 @@ A step concerns one person, or all who are here. People who have gone have no op
 while, in case they come back.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import partial
 
 from engage_hri.schemas.units import Seconds
@@ -119,18 +119,14 @@ class People:
         self._apply(self.persons[id], at, step)
         self._follow(at)
 
-    def apply_to_all(self, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
-        """Apply a step to all who are here."""
-        self._apply_to(list(self._here.values()), at, step)
-
-    def apply_to_involved(self, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
-        """Apply a step to those with whom something goes on: one that changes nothing for all others."""
-        self._apply_to([person for person in self._here.values() if person.is_involved], at, step)
-
-    def _apply_to(
-        self, persons: Iterable[PersonRecognition], at: Seconds, step: Callable[[PersonRecognition], object]
+    def apply_to_all(
+        self,
+        at: Seconds,
+        step: Callable[[PersonRecognition], object],
+        where: Callable[[PersonRecognition], object] = lambda person: True,
     ) -> None:
-        for person in persons:
+        """Apply a step to all who are here. where: tells for whom it may change something."""
+        for person in [person for person in self._here.values() if where(person)]:
             self._apply(person, at, step)
         self._follow(at)
 
@@ -156,7 +152,7 @@ class People:
     def _looks_may_direct(self, at: Seconds) -> None:
         """Update the deadlines of those whose looks may direct the robot's now, for what all share has changed."""
         for person in list(self._here.values()):
-            if person.gaze.targets and not person.gaze.spent:
+            if person.look_directs_at is not None:
                 self._apply(person, at, lambda person: None)
 
     def _apply(self, person: PersonRecognition, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:

@@ -177,9 +177,10 @@ class Session:
                 self._cancel(observation, at)
             case SyncPointProgress(block=block):
                 name = self.blocks.realised(block, observation.behavior, observation.sync, at)
-                waiting = {event.responder for event in self._live.values() if event.block == block}
-                for id in waiting & self.persons.keys():
-                    self._people.apply(id, at, lambda person: person.point_realised(block, name, at))
+                asked = {event.responder for event in self._live.values() if event.block == block}
+                for id in asked & self.persons.keys():
+                    if self.persons[id].waits_for(block, name):
+                        self._people.apply(id, at, lambda person: person.point_realised(block, name, at))
             case BlockProgress(block=str() as block, progress="start"):
                 self._block_begins(block, at)
             case BlockProgress(block=str() as block, progress="end"):
@@ -188,7 +189,9 @@ class Session:
                 self._robot_is_heard(bool(said), at)
             case HeadOwner(owner=owner):
                 self.scene.head_owner = owner
-                self._people.apply_to_involved(at, lambda person: person.head_owner_changed(at))
+                self._people.apply_to_all(
+                    at, lambda person: person.head_owner_changed(at), lambda person: person.has_gaze_event
+                )
             case World():
                 self._people.see(observation, at)
             case Covered():
@@ -309,7 +312,9 @@ class Session:
                 self._ends_in_talk(at, lambda talk: talk.robot_gesture_ends(ended.action, at))
 
     def _ends_in_talk(self, at: Seconds, step: Step) -> None:
-        self._people.apply_to_involved(at, lambda person: person.talk.take(at, step))
+        self._people.apply_to_all(
+            at, lambda person: person.talk.take(at, step), lambda person: person.talk.is_under_way
+        )
 
     def _understand(self, words: Worded, at: Seconds) -> None:
         """Take the words of a person's speech, and to whom perception says that they are."""
@@ -345,7 +350,7 @@ class Session:
                 self._robot_ends(ended, at)
 
     def _robot_gaze_changed(self, at: Seconds) -> None:
-        self._people.apply_to_involved(at, lambda person: person.gaze_changed(at))
+        self._people.apply_to_all(at, lambda person: person.gaze_changed(at), lambda person: person.is_involved)
 
     # -- requests -----------------------------------------------------------------------------------------------
 
@@ -510,7 +515,11 @@ class Session:
         self.blocks.ended[block] = at
         self.scene.listening_blocks.pop(block, None)
         self._robot_stops(at, f"{block}:")
-        self._people.apply_to_involved(at, lambda person: person.block_ended(block, at, aborted=aborted))
+        self._people.apply_to_all(
+            at,
+            lambda person: person.block_ended(block, at, aborted=aborted),
+            lambda person: person.is_involved,
+        )
         answered = self._answering_blocks.pop(block, None)
         if answered is not None:
             self._tell(answered, at, lambda talk: talk.pair.answered_block_ended(at))
