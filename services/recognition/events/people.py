@@ -175,12 +175,13 @@ class People:
             del scene.questions[id]
         self.agenda.set(id, person.deadline)
         self.touched.add(id)
-        here, was_here = person.presence.here, id in self._here
-        (scene.found.add if here and person.presence.reported else scene.found.discard)(id)
+        presence = person.presence
+        here, was_here = presence.here, id in self._here
+        (scene.found.add if here and presence.reported else scene.found.discard)(id)
         if was_here and not here:
             del self._here[id]
             scene.present.discard(id)
-            self._note(person, person.presence.left_at)
+            self._note(person, presence.left_at)
         elif here and not was_here:
             self._here[id] = person
             scene.present.add(id)

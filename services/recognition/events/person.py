@@ -75,14 +75,17 @@ class PersonRecognition:
     @property
     def deadline(self) -> Seconds | None:
         """Time of the next step that is due by itself, unless an input comes before; then call `pass_time`."""
-        times = [self.presence.deadline, self.facial.deadline, *self.talk.deadlines]
+        times = [self.presence.deadline, *self.talk.deadlines]
         if self.gaze.targets:
             times += self.gaze.deadline, self.look_directs_at
+        if self.facial.event is not None:
+            times.append(self.facial.deadline)
         for directed in self.directed:
             times.append(directed.deadline)
         for doing in self._doing.values():
             times.append(doing.until)
-        return min([at for at in times if at is not None], default=None)
+        known = [at for at in times if at is not None]
+        return min(known) if known else None
 
     @property
     def _timed_steps(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:

@@ -110,7 +110,8 @@ class Session:
         if not self._people.touched:
             return {}
         touched, self._people.touched = self._people.touched, set()
-        return {id: self.persons[id].contact for id in touched if id in self.persons}
+        persons = self._people.persons
+        return {id: persons[id].contact for id in touched if id in persons}
 
     @property
     def busy(self) -> Set[str]:
@@ -122,7 +123,10 @@ class Session:
     @property
     def deadline(self) -> Seconds | None:
         """Time at which `advance` has something to do, unless an observation comes first."""
-        gaze, people = self.scene.gaze.deadline, self._people.agenda.earliest
+        people = self._people.agenda.earliest
+        if self.scene.gaze.ended is None:
+            return people
+        gaze = self.scene.gaze.deadline
         return people if gaze is None or (people is not None and people < gaze) else gaze
 
     def advance(self, now: Seconds) -> list[Effect]:
