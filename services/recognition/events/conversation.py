@@ -265,6 +265,10 @@ class Conversation:
             return None
         return is_listening(words)
 
+    def resumes(self, event: OngoingEvent, at: Seconds) -> None:
+        """Go on with a pair of a former life of recognition."""
+        self.pair.resume(event, at, by_robot=event.responder == self.id)
+
     def manipulates(self, at: Seconds, confidence: Probability = 1.0) -> None:
         self._human_turn(at, "act", confidence)
 

@@ -103,6 +103,8 @@ class OngoingEvent(Struct, kw_only=True):
     confidence: Probability = 1.0
     """Least confidence of the observations on which the event rests."""
     changed: Seconds | None = None
+    is_former: bool = False
+    """True if a former life of recognition has told its start already. Its delay is not known."""
     spoken: tuple[Seconds, ...] = ()
     """Starts of the person's speeches that it consists of: its words are theirs."""
 
@@ -151,14 +153,16 @@ class EventWriter:
         if state == "failed" and not retold:
             event.delay = at - event.started
         begins, ends = state == "started", state == "completed"
+        knows_delay = not begins and (state == "failed" or not event.is_former)
         told = ConnectionEvent(
                 id=event.id, kind=event.kind, initiator=event.initiator, responder=event.responder, state=state,
                 at=self.stamp(at), started=self.stamp(event.started), objects=event.objects, cause=event.cause,
-                optional=event.optional, delay=None if begins else event.delay,
+                optional=event.optional, delay=event.delay if knows_delay else None,
                 duration=event.duration if ends else None, limit=event.limit if begins else None,
                 response=None if begins else event.response, answered_by=event.answered_by,
                 confidence=event.confidence, block=event.block, behavior=event.behavior, turn=event.turn,
-                words=self._words_of(event), retold=retold,
+                words=self._words_of(event),
+                retold=retold or (begins and event.is_former),
         )  # fmt: skip
         self.effects.append(told)
         if event.spoken:

@@ -17,7 +17,7 @@ from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import HeadOwner
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn, TurnOutcome
+from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, TurnOutcome
 from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
@@ -201,6 +201,21 @@ class Session:
             case Covered():
                 self.scene.covered = observation
                 self._people.apply_to_all(at, lambda person: person.hands_changed())
+        return self._take()
+
+    def resume(self, former: ConnectionEvent, at: Seconds) -> list[Effect]:
+        """Go on with a pair that a former life has begun. The end of its turn is not known: it counts as over now.
+
+        Nor is it known which actions answer the robot: all do. The pair has another id, and no delay is told of it.
+        """
+        person = former.person(self.robot)
+        event = OngoingEvent(
+            kind=former.kind, initiator=former.initiator, responder=former.responder, started=former.started.seconds,
+            cause=former.cause, optional=former.optional, limit=former.limit, accept=(*ACCEPT, "act"),
+            block=former.block, behavior=former.behavior, turn=former.turn, confidence=former.confidence,
+            is_former=True,
+        )  # fmt: skip
+        self._people.observe(person, at, lambda person: person.talk.take(at, lambda talk: talk.resumes(event, at)))
         return self._take()
 
     def lose_track(self, person: str, at: Seconds) -> list[Effect]:
