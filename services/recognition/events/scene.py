@@ -174,7 +174,8 @@ class SessionScene:
                 self._others[id] = at
                 if kind == "person" and id != self.robot:
                     people.add(id)
-                    self.names |= {name.casefold(): id for name in (id, entity.name) if name}
+                    if entity.name or id not in self.people_in_world:
+                        self.names |= {name.casefold(): id for name in (id, entity.name) if name}
         if people != self.people_in_world:
             self.people_in_world = frozenset(people)
         return not known or len(self._objects) > known

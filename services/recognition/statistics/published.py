@@ -76,14 +76,14 @@ class PublishedStatistics:
         changes: Iterable[ConnectionEvent | PersonForgotten],
         busy: Set[str],
         now: Seconds,
-        contacts: Mapping[str, Probability] = {},
+        contacts: Mapping[str, Probability | None] = {},
     ) -> None:
         """Count changes, in their order.
 
         busy: persons with a task in hand. contacts: how much of a contact there is now, where that may have changed.
         """
         for actor, much in contacts.items():
-            if self._actors[actor].engagement.contact.now != much:
+            if much is not None and self._actors[actor].engagement.contact.now != much:
                 self._actors[actor].engagement.touch(much, now)
                 self._changed.add(actor)
         for change in changes:
