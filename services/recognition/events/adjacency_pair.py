@@ -148,6 +148,12 @@ class AdjacencyPair(Machine):
         self._by_robot = by_robot
         self._turn_end = self._last_heard = self._response_until = None
 
+    def resume(self, event: OngoingEvent, at: Seconds, *, by_robot: bool) -> None:
+        """Begin a pair that a former life of recognition has told, and whose first turn is over by now."""
+        self._open(event, by_robot=by_robot)
+        self.step("robot_asks" if by_robot else "human_asks", event.started)
+        self.turn_ends(at)
+
     def is_turn(self, turn: str) -> bool:
         """True if `turn` (empty: any) is the robot's turn with which this pair began."""
         return self.event is not None and self._by_robot and turn in ("", self.event.turn)

@@ -66,6 +66,8 @@ class Conversation:
     @property
     def deadlines(self) -> tuple[Seconds | None, ...]:
         """Times of the `timed_steps`."""
+        if self.pair.event is None and self._sign is None and self.robot_backchannel.event is None:
+            return ()
         return self._sign_deadline, self.robot_backchannel.deadline, self._pair_deadline
 
     @property
@@ -79,7 +81,9 @@ class Conversation:
     def _pair_deadline(self) -> Seconds | None:
         """Deadline of the pair; None while speech of anybody that began in time may yet turn out to be the answer."""
         at, speeches = self.pair.deadline, self._sign.speeches if self._sign is not None else []
-        began_in_time = at is not None and any(in_time(speech.since, at) for speech in speeches)
+        if at is None:
+            return None
+        began_in_time = any(in_time(speech.since, at) for speech in speeches)
         if began_in_time and self.pair.may_be_answered_with("speak"):
             return None
         question = self.pair.question
@@ -109,6 +113,12 @@ class Conversation:
     @property
     def holds_floor(self) -> bool:
         return self.speaks_since is not None
+
+    @property
+    def is_under_way(self) -> bool:
+        """True if one holds the floor, or a pair, a sign or a backchannel is open."""
+        is_open = self.pair.event is not None or self.robot_backchannel.event is not None or self._cut_into
+        return self.robot_speaks_now or self.holds_floor or self._sign is not None or bool(is_open)
 
     def speaks(self, at: Seconds, confidence: Probability = 1.0) -> None:
         if self.speaks_since is not None:
@@ -256,6 +266,10 @@ class Conversation:
         """True if the words of a speech are a listener's; None: they are unknown, or the robot's turn is over."""
         words = self._writer.text_of(self.id, since)
         return is_listening(words) if words and self.robot_holds_floor else None
+
+    def resumes(self, event: OngoingEvent, at: Seconds) -> None:
+        """Go on with a pair of a former life of recognition."""
+        self.pair.resume(event, at, by_robot=event.responder == self.id)
 
     def manipulates(self, at: Seconds, confidence: Probability = 1.0) -> None:
         self._human_turn(at, "act", confidence)

@@ -72,6 +72,11 @@ class Talk:
         """The robot's question that waits for the person's answer; None: none does, or that is not known yet."""
         return None if self._line else self._conversation.pair.question
 
+    @property
+    def is_under_way(self) -> bool:
+        """True if either speaks to the other, or something of the talk is open."""
+        return bool(self._line) or self._conversation.is_under_way
+
     # -- time ---------------------------------------------------------------------------------------------------
 
     @property
