@@ -128,6 +128,11 @@ class AdjacencyPair(Machine):
         """
         if self.state == HUMAN_WAITING and self._turn_end is None:
             self._answer("robot_answers", "speak", at)
+        return self.is_cut_into
+
+    @property
+    def is_cut_into(self) -> bool:
+        """True if the robot has begun its answer, and the person still speaks."""
         return self.state == INTERRUPTED and not self._by_robot
 
     def human_asks(self, event: OngoingEvent, action: Action) -> None:
@@ -200,6 +205,11 @@ class AdjacencyPair(Machine):
             self.step("other_answers", at)
 
     # -- second turn --------------------------------------------------------------------------------------------
+
+    @property
+    def may_be_answered(self) -> bool:
+        """True if the robot asks, or waits for an answer of the person."""
+        return self.state == ROBOT_WAITING
 
     def may_be_answered_with(self, action: Action) -> bool:
         """True if the robot waits for an answer of the person, and `action` is one."""

@@ -134,6 +134,8 @@ class Conversation:
 
     def gestures(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> None:
         """Take a nod, a shake or a point of the person."""
+        if self.holds_floor and (self._sign is None or not self._sign.going_on("speak")):
+            return  # it goes with the person's own words, and says nothing more
         if self.robot_holds_floor:
             self._signs(action, at, confidence)
         elif not self.pair.human_begins(action, at, confidence):
@@ -297,7 +299,7 @@ class Conversation:
         self.robot_speaks_now = True
         self.pair.robot_heard(None)
         if self.holds_floor and not self.pair.robot_holds_turn:
-            if self.robot_backchannel.state != BRIEF:
+            if self.robot_backchannel.state != BRIEF and not self.pair.is_cut_into:
                 self.robot_backchannel.speaks(self._backchannel(self.id, self._scene.robot, at))
         elif not listens:
             self.pair.robot_begins("speak", at)
@@ -358,6 +360,8 @@ class Conversation:
         """Take the robot's second turn, or a third one that repairs. Either answers a waiting person."""
         if repairs:
             self.pair.repaired(at)
+        if self.robot_backchannel.state == UNDECIDED:
+            self.robot_backchannel.takes_floor("outlasts_turn", at)
         self.pair.robot_begins("speak", at)
         self.pair.forget_unanswered()
 

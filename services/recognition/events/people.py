@@ -133,11 +133,20 @@ class People:
         self._follow_speech(at)
 
     def _follow_answers(self, at: Seconds) -> None:
-        """Tell those who were asked that somebody else has answered in their place, or may yet do so."""
-        if self._unknown != self._scene.unknown:
+        """Tell those who were asked that somebody else has answered in their place, or may yet do so.
+
+        Also let go on what has waited until it is known to whom somebody else speaks, the earliest first.
+        """
+        self._tell_taken_up(at)
+        while self._unknown != self._scene.unknown:
             self._unknown = {**self._scene.unknown}
             for id in [*self._scene.questions]:
                 self._update(self.persons[id])
+            for id in sorted(self._unknown, key=lambda id: (self._unknown[id], id)):
+                self._apply(self.persons[id], at, lambda person: person.talk.go_on(at))
+                self._tell_taken_up(at)
+
+    def _tell_taken_up(self, at: Seconds) -> None:
         while self._scene.taken_up:
             taken_up = self._scene.taken_up.pop()
             if taken_up.asked in self.persons:
@@ -165,6 +174,7 @@ class People:
             self._scene.questions[person.id] = question
         else:
             self._scene.questions.pop(person.id, None)
+        (self._scene.asked.add if person.talk.is_asked else self._scene.asked.discard)(person.id)
         self._agenda.set(person.id, person.deadline)
         self.touched.add(person.id)
         here, was_here = person.presence.here, person.id in self._here
@@ -183,4 +193,4 @@ class People:
 def _answered_by_other(taken_up: TakenUp, asked: PersonRecognition) -> None:
     """Tell the person who was asked that somebody else has answered."""
     _, by, action, at = taken_up
-    asked.talk.take(at, lambda talk: talk.pair.other_answers(by, action, at))
+    asked.talk.other_answers(by, action, at)
