@@ -47,6 +47,10 @@ class Side:
         """The robot's turn that waits for the person's answer."""
         self.unanswered: Turn | None = None
         """The robot's last turn, if nobody has answered it in time."""
+        self.cut_into: Span | None = None
+        """The person's words into which the robot has begun its answer."""
+        self.is_spoken_to_again = False
+        """True if the robot has gone on to speak since it asked."""
         self.third_until = -1.0
         self.answers_until = BEFORE
         """End of the person's last answer: what begins before it is part of it."""
@@ -61,6 +65,8 @@ class Coder:
         self._events: dict[tuple[str, str, str, float], Coded] = {}
         self._used: set[int] = set()
         """Signs that have been read within a turn of the robot, by `id`."""
+        self._turns: set[int] = set()
+        """Those that turned out to be turns of the person, to be read when they come."""
         self._gone = [each for each in timeline.away if each.until[0] - each.since[0] >= FACE_GRACE]
 
     def events(self) -> list[Coded]:
@@ -74,6 +80,8 @@ class Coder:
                 self._robot(self._sides[act.to], act)
             elif isinstance(act, Absence):
                 self._leaves(self._sides[act.who], act)
+            elif id(act) in self._turns:
+                self._takes_turn(self._sides[act.who], act)
             elif id(act) not in self._used:
                 self._person(self._sides[act.who], act)
         for side in self._sides.values():
@@ -96,7 +104,7 @@ class Coder:
         """Let the limits pass that are over before `now`."""
         if side.asked is not None and side.asked.until[0] + LIMIT + ROUND < now:
             self._pair_of(side.asked, "failed")
-            side.asked, side.unanswered = None, side.asked
+            side.asked, side.unanswered = None, None if side.is_spoken_to_again else side.asked
         if side.own and side.own[-1].until[0] + LIMIT + ROUND < now:
             self._own_pair(side, "failed")
 
@@ -112,29 +120,38 @@ class Coder:
     def _robot(self, side: Side, turn: Turn) -> None:
         """Read a turn of the robot: it answers who waits, or still speaks; and what is said and shown into it."""
         was_waiting = bool(side.own)
+        was_over = was_waiting and side.own[-1].until < turn.since
         if was_waiting:
+            side.cut_into = None if was_over else side.own[-1]
             self._own_pair(side, "succeeded", delay=turn.since[0] - side.own[-1].until[0])
-            if turn.kind == "replies":
-                side.third_until = turn.until[0] + THIRD_TURN
+            # An answer that asks is over, as an answer, when the question begins.
+            end = turn.until if turn.kind == "replies" else turn.since if was_over else BEFORE
+            side.third_until = end[0] + THIRD_TURN
+        elif side.cut_into is not None and turn.since < side.cut_into.until:
+            side.third_until = turn.until[0] + THIRD_TURN  # it goes on with its answer
+        elif turn.kind == "replies" and self._is_listening(side, turn):
+            self._note("backchannel", side.person, ROBOT, turn.since[0], "completed")
         if turn.kind == "asks" and side.asked is not None:
             self._pair_of(side.asked, "superseded")
             side.asked = None
         side.unanswered = None
-        answer = self._listens(side, turn)
+        side.is_spoken_to_again = side.asked is not None
+        answers = self._listens(side, turn)
+        answer = answers[0] if answers else None
         if turn.kind != "asks":
             # What interrupts an answer is of the same exchange; what goes on after it is the third turn.
-            if answer is not None and not (was_waiting and self._is_decided(answer, turn)):
-                self._takes_turn(side, answer)
+            kept = [each for each in answers if not (was_waiting and self._is_decided(each, turn))]
+            self._turns |= {id(each) for each in kept}
         elif answer is not None:
             self._pair_of(turn, "succeeded", delay=answer.since[0] - turn.until[0])
-            side.answers_until = answer.until
+            side.answers_until, side.third_until = answer.until, -1.0
         elif turn.is_aborted:
             self._pair_of(turn, "withdrawn")
         else:
             side.asked = turn
 
-    def _listens(self, side: Side, turn: Turn) -> Span | None:
-        """Read what a person does in the robot's turn. Returns the answer, if one is given so early."""
+    def _listens(self, side: Side, turn: Turn) -> list[Span]:
+        """Read what a person does in the robot's turn. Returns what takes the floor."""
         signs = [
             each for each in self._timeline.spans
             if each.who == side.person and each.to == ROBOT and each.action != "look"
@@ -142,16 +159,37 @@ class Coder:
         ]  # fmt: skip
         self._used |= {id(each) for each in signs}
         signs = [each for each in signs if not self._goes_with_words(each, turn)]
-        answer: Span | None = None
-        for sign in self._together(signs):
+        found: list[Span] = []
+        sets = [*self._together(signs)]
+        for number, sign in enumerate(sets):
             goes_on = [each for each in sign if each.until > turn.until]
             interrupts = [each for each in sign if each.action == "speak" and self._interrupts(each, turn)]
-            answers = [*goes_on, *interrupts]
-            if answers and answer is None:
-                answer = min(answers, key=lambda each: each.since)
-            elif all(each.action != "speak" for each in answers) and any(each.action != "point" for each in sign):
+            answers = sorted([*goes_on, *interrupts], key=lambda each: each.since)
+            following = sets[number + 1][0].since if number + 1 < len(sets) else turn.until
+            is_brief = any(self._is_told_late(each, turn, following) for each in interrupts) and not goes_on
+            if any(each.action == "speak" for each in answers) or (answers and not found):
+                found.append(answers[0])
+                is_listening = is_brief
+            else:
+                is_listening = any(each.action != "point" for each in sign)
+            if is_listening:
                 self._note("backchannel", ROBOT, side.person, sign[0].since[0], "completed")
-        return answer
+        return found
+
+    def _is_listening(self, side: Side, turn: Turn) -> bool:
+        """True if the robot says a little while the person speaks, and has nothing to answer."""
+        speech = [each for each in self._timeline.spans if each.who == side.person and each.action == "speak"]
+        beside = any(each.to == ROBOT and each.since < turn.since and turn.until < each.until for each in speech)
+        return beside and turn.until[0] - turn.since[0] <= BRIEF + ROUND
+
+    def _is_told_late(self, speech: Span, turn: Turn, following: Instant) -> bool:
+        """True if a speech counts as a listener's when its words come, so that it has been told as one.
+
+        following: when the next sign begins.
+        """
+        if turn.kind != "asks" or speech.known is None or speech.seconds > WORDS_WAIT + ROUND:
+            return False
+        return following < speech.known or speech.known[0] > speech.since[0] + WORDS_WAIT + ROUND
 
     def _goes_with_words(self, sign: Span, turn: Turn) -> bool:
         """True for a gesture beside the person's own words, if these are no listener's: it says nothing more."""
@@ -201,7 +239,7 @@ class Coder:
         at = sign.since[0]
         if side.asked is not None:
             self._pair_of(side.asked, "succeeded", delay=at - side.asked.until[0])
-            side.asked, side.answers_until = None, sign.until
+            side.asked, side.answers_until, side.third_until = None, sign.until, -1.0
         elif sign.action == "speak" and (asked := self._asked_of_another(side, sign)) is not None:
             turn = asked.asked
             assert turn is not None
@@ -220,9 +258,10 @@ class Coder:
     def _asked_of_another(self, side: Side, sign: Span) -> Side | None:
         """Whom the robot has asked, and who has not answered yet when somebody else says this."""
         asked = [each for each in self._sides.values() if each is not side and each.asked is not None]
-        last = side.own[-1].until if side.own else BEFORE
+        last = (side.own[-1].until if side.own else BEFORE)[0]
         at = sign.since[0]
-        return next((each for each in asked if last < each.asked.until and each.asked.until[0] < at), None)
+        waiting = [each for each in asked if last < each.asked.until[0] < at]
+        return max(waiting, key=lambda each: each.asked.until, default=None)
 
 
 def _known(act: Span | Turn | Absence) -> Instant:

@@ -198,7 +198,7 @@ class Drawing:
             one.known = max(one.known, (until[0], until[1] + 1))
         self.timeline.spans.append(one)
         if len(self.timeline.people) > 1:
-            self.timeline.spans.append(Span(person, "look", (since[0] - 0.05, 0), (until[0] + 0.05, 0), to))
+            self.timeline.spans.append(Span(person, "look", (round(since[0] - 0.05, 6), 0), (round(until[0] + 0.05, 6), 0), to))
 
     def _gesture(self, person: str, since: float, until: float) -> None:
         chance = self._chance
@@ -230,6 +230,10 @@ class Drawing:
             until = (last[0], last[1] + 1)
             if kind == "asks" and chance.random() < 0.3:
                 until = max(until, self._at(last[0] + self._between(0.0, 0.5)))
+            if len(self.timeline.people) > 1:  # words that come after the turn: it depends on what else is known then
+                for one in spoken:
+                    if one.who == to and one.known is not None and one.until <= until <= one.known:
+                        one.known = one.until[0], one.until[1] + 1
             if not self._is_away(to, at - 2.5, until[0] + 0.1):
                 turn = Turn(f"turn{len(self.timeline.turns)}", kind, to, speech, until)
                 turn.is_aborted = kind == "asks" and chance.random() < 0.15

@@ -9,7 +9,7 @@ from engage_hri.schemas.behaviors import Action, Cause
 from engage_hri.schemas.recognition import InterjectionReading
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.adjacency_pair import AdjacencyPair
+from engage_hri.services.recognition.events.adjacency_pair import RESPONDING, AdjacencyPair
 from engage_hri.services.recognition.events.backchannel import BRIEF, UNDECIDED, Backchannel
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.limits import in_time
@@ -213,7 +213,6 @@ class Conversation:
         if part.action == "speak":
             self._writer.interject(self.id, part.since, reading, at)
             self._human_turn(part.since, "speak", part.confidence)
-            self.understand(part.since, at)
         elif self.pair.human_begins(part.action, part.since, part.confidence) and part.until is not None:
             self.pair.ends(part.action, part.until, by_robot=False)
 
@@ -276,6 +275,8 @@ class Conversation:
         pair = self.pair
         if pair.human_begins(action, at, confidence):
             pass
+        elif pair.state == RESPONDING:
+            return  # it is part of this exchange
         elif self._scene.answers_for_another(self.id, action, at, after=pair.asked_until):
             pair.forget_unanswered()
         elif pair.answers_late(action, at, confidence) or pair.human_goes_on(action, at):
