@@ -21,6 +21,8 @@ THIRD_TURN = 1.5
 FACE_GRACE = 2.0
 ROUND = 1e-6
 BEFORE = (-1.0, 0)
+LAST = 10**9
+"""After all else that happens at a time."""
 
 
 class Coded(Struct, frozen=True, order=True):
@@ -49,8 +51,6 @@ class Side:
         """The robot's last turn, if nobody has answered it in time."""
         self.cut_into: Span | None = None
         """The person's words into which the robot has begun its answer."""
-        self.is_spoken_to_again = False
-        """True if the robot has gone on to speak since it asked."""
         self.third_until = -1.0
         self.answers_until = BEFORE
         """End of the person's last answer: what begins before it is part of it."""
@@ -104,7 +104,7 @@ class Coder:
         """Let the limits pass that are over before `now`."""
         if side.asked is not None and side.asked.until[0] + LIMIT + ROUND < now:
             self._pair_of(side.asked, "failed")
-            side.asked, side.unanswered = None, None if side.is_spoken_to_again else side.asked
+            side.asked, side.unanswered = None, side.asked
         if side.own and side.own[-1].until[0] + LIMIT + ROUND < now:
             self._own_pair(side, "failed")
 
@@ -128,14 +128,14 @@ class Coder:
             end = turn.until if turn.kind == "replies" else turn.since if was_over else BEFORE
             side.third_until = end[0] + THIRD_TURN
         elif side.cut_into is not None and turn.since < side.cut_into.until:
-            side.third_until = turn.until[0] + THIRD_TURN  # it goes on with its answer
+            if turn.kind == "replies":  # it goes on with its answer
+                side.third_until = turn.until[0] + THIRD_TURN
         elif turn.kind == "replies" and self._is_listening(side, turn):
             self._note("backchannel", side.person, ROBOT, turn.since[0], "completed")
         if turn.kind == "asks" and side.asked is not None:
             self._pair_of(side.asked, "superseded")
             side.asked = None
         side.unanswered = None
-        side.is_spoken_to_again = side.asked is not None
         answers = self._listens(side, turn)
         answer = answers[0] if answers else None
         if turn.kind != "asks":
@@ -158,20 +158,26 @@ class Coder:
             and turn.since < each.since < turn.until
         ]  # fmt: skip
         self._used |= {id(each) for each in signs}
-        signs = [each for each in signs if not self._goes_with_words(each, turn)]
+        every, signs = signs, [each for each in signs if not self._goes_with_words(each, turn)]
         found: list[Span] = []
         sets = [*self._together(signs)]
+        may_be_answered = turn.kind == "asks" or side.asked is not None
         for number, sign in enumerate(sets):
-            goes_on = [each for each in sign if each.until > turn.until]
+            goes_on = [
+                each for each in sign if each.until > turn.until and (each.action == "speak" or may_be_answered)
+            ]  # fmt: skip
             interrupts = [each for each in sign if each.action == "speak" and self._interrupts(each, turn)]
             answers = sorted([*goes_on, *interrupts], key=lambda each: each.since)
             following = sets[number + 1][0].since if number + 1 < len(sets) else turn.until
-            is_brief = any(self._is_told_late(each, turn, following) for each in interrupts) and not goes_on
+            over = max(each.until for each in every if sign[0].since <= each.since <= sign[-1].until)
+            late = [each for each in interrupts if self._is_told_late(each, turn, following)]
+            is_brief = any(over < each.known for each in late if each.known is not None) and not goes_on
             if any(each.action == "speak" for each in answers) or (answers and not found):
                 found.append(answers[0])
                 is_listening = is_brief
             else:
-                is_listening = any(each.action != "point" for each in sign)
+                is_decided = bool(found) and any(each.seconds > WORDS_WAIT + ROUND for each in sign)
+                is_listening = any(each.action != "point" for each in sign) and not is_decided
             if is_listening:
                 self._note("backchannel", ROBOT, side.person, sign[0].since[0], "completed")
         return found
@@ -266,7 +272,7 @@ class Coder:
 
 def _known(act: Span | Turn | Absence) -> Instant:
     """When it is taken into account: a face that is back soon had not gone."""
-    return (act.since[0] + FACE_GRACE, 0) if isinstance(act, Absence) else act.since
+    return (act.since[0] + FACE_GRACE, LAST) if isinstance(act, Absence) else act.since
 
 
 def as_told(events: Sequence[ConnectionEvent]) -> list[Coded]:

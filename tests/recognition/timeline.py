@@ -194,7 +194,8 @@ class Drawing:
         one = Span(person, "speak", since, until, to)
         if self.timeline.is_worded and chance.random() < 0.8:
             one.words = chance.choice((*LISTENING, *OTHER))
-            one.known = self._at(until[0] + chance.choice((0.0, 0.1)))
+            is_alone = len(self.timeline.people) == 1
+            one.known = self._at(until[0] + (chance.choice((0.0, 0.1)) if is_alone or one.seconds < 1.3 else 0.0))
             one.known = max(one.known, (until[0], until[1] + 1))
         self.timeline.spans.append(one)
         if len(self.timeline.people) > 1:
@@ -220,9 +221,14 @@ class Drawing:
             if following and chance.random() < 0.6:
                 one = chance.choice(following)
                 to, at = one.who, max(at, one.until[0] + chance.choice((self._between(-0.5, 2.0), self._between(0, 6.0))))
+            waiting = [each for each in self.timeline.turns if at < each.until[0] + LIMIT]
+            if waiting and len(self.timeline.people) > 1:
+                kind = "asks"  # else it depends on what is known first: who answers, or that who was asked does not
             speech, over = [], at
             for _ in range(chance.choice((1, 1, 2)) if kind == "asks" else 1):
                 begins = self._at(over)
+                if len(self.timeline.people) > 1:
+                    begins = begins[0], -1
                 over = begins[0] + self._between(0.5, 3.0)
                 speech.append((begins, self._at(over)))
                 over += self._between(0.2, 1.0)

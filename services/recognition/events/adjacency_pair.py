@@ -74,8 +74,6 @@ class AdjacencyPair(Machine):
         self._third_turn_until: Seconds = 0.0
         self._unanswered: OngoingEvent | None = None
         """The robot's last pair, if its limit passed without an answer and nobody has begun a turn since."""
-        self._may_be_late = True
-        """False if the robot has spoken again since it asked."""
 
     @property
     def robot_holds_turn(self) -> bool:
@@ -99,7 +97,7 @@ class AdjacencyPair(Machine):
         elif self._turn_end is None:
             self.step("withdraw", at)
         else:
-            self._unanswered = self.event if self._by_robot and self._may_be_late else None
+            self._unanswered = self.event if self._by_robot else None
             self.step("limit", at)
 
     # -- first turn ---------------------------------------------------------------------------------------------
@@ -144,7 +142,7 @@ class AdjacencyPair(Machine):
         self.step("human_asks", event.started)
 
     def _open(self, event: OngoingEvent, *, by_robot: bool) -> None:
-        self._unanswered, self._may_be_late = None, True
+        self.forget_unanswered()
         self.event = event
         self._by_robot = by_robot
         self._turn_end = self._last_heard = self._response_until = None
@@ -248,7 +246,7 @@ class AdjacencyPair(Machine):
 
     def forget_unanswered(self) -> None:
         """Begin another turn: from now on nothing answers the robot's turn before, however late."""
-        self._unanswered, self._may_be_late = None, self._turn_end is None
+        self._unanswered = None
 
     def _is_earlier_answer(self, action: Action, at: Seconds) -> bool:
         """True if the action, known only now, began before the one that has been taken for the answer so far."""

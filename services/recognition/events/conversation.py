@@ -9,7 +9,7 @@ from engage_hri.schemas.behaviors import Action, Cause
 from engage_hri.schemas.recognition import InterjectionReading
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.adjacency_pair import RESPONDING, AdjacencyPair
+from engage_hri.services.recognition.events.adjacency_pair import INTERRUPTED, RESPONDING, AdjacencyPair
 from engage_hri.services.recognition.events.backchannel import BRIEF, UNDECIDED, Backchannel
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.limits import in_time
@@ -275,7 +275,7 @@ class Conversation:
         pair = self.pair
         if pair.human_begins(action, at, confidence):
             pass
-        elif pair.state == RESPONDING:
+        elif pair.state in (INTERRUPTED, RESPONDING):
             return  # it is part of this exchange
         elif self._scene.answers_for_another(self.id, action, at, after=pair.asked_until):
             pair.forget_unanswered()

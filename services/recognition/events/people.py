@@ -28,7 +28,8 @@ class People:
         """Time of the last sign of each person who has gone or is not reported as present. The longest ago first."""
         self._met = 0
         self._unknown: dict[str, Seconds] = {}
-        """`scene.unknown` when the deadlines of those who were asked were last updated."""
+        self._asked: set[str] = set()
+        """`scene.unknown` and `scene.asked` when the deadlines of those who were asked were last updated."""
         self.touched: set[str] = set()
         """Persons whose contact with the robot may have changed since somebody emptied this."""
         self._speech = 0
@@ -138,8 +139,8 @@ class People:
         Also let go on what has waited until it is known to whom somebody else speaks, the earliest first.
         """
         self._tell_taken_up(at)
-        while self._unknown != self._scene.unknown:
-            self._unknown = {**self._scene.unknown}
+        while (self._unknown, self._asked) != (self._scene.unknown, self._scene.asked):
+            self._unknown, self._asked = {**self._scene.unknown}, {*self._scene.asked}
             for id in [*self._scene.questions]:
                 self._update(self.persons[id])
             for id in sorted(self._unknown, key=lambda id: (self._unknown[id], id)):

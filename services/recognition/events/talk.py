@@ -8,7 +8,6 @@ known late has happened early.
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from functools import partial
 
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.units import Probability, Seconds
@@ -167,7 +166,7 @@ class Talk:
         for speech in self._unknown:
             self._likely(speech, at)
         self.go_on(at)
-        self._conversation.person_gone(at, until)
+        self._take_in_order(at, lambda talk: talk.person_gone(at, until))
 
     def person_back(self) -> None:
         """Take the person's return: the robot may be speaking, or may have fallen silent meanwhile."""
@@ -187,13 +186,16 @@ class Talk:
 
     def robot_asks(self, event: OngoingEvent) -> None:
         """Take the robot's first turn."""
-        at, step = event.started, partial(Conversation.robot_asks, event=event)
+        self._take_in_order(event.started, lambda talk: talk.robot_asks(event))
+        self._is_asked_in_line = bool(self._line)
+
+    def _take_in_order(self, at: Seconds, step: Step) -> None:
+        """Take what ends a question of the robot, after what somebody else may have answered before."""
         if self.is_asked and self._waits_for_others(at):
             self._line.append((at, step))
             self._note_unknown()
         else:
             self.take(at, step)
-        self._is_asked_in_line = bool(self._line)
 
     def other_answers(self, person: str, action: Action, at: Seconds) -> None:
         """Take the answer of somebody else. It comes before all that is in line."""
