@@ -12,7 +12,7 @@ from msgspec.structs import astuple
 
 from engage_hri.schemas.recognition import ConnectionEvent
 from tests.recognition.observations import ROBOT
-from tests.recognition.timeline import LIMIT, LISTENING, Absence, Instant, Span, Timeline, Turn
+from tests.recognition.timeline import LIMIT, LISTENING, Absence, Drawing, Instant, Span, Timeline, Turn
 
 BRIEF = 0.8
 """Longest speech of a listener whose words nobody tells."""
@@ -299,3 +299,12 @@ def rounded(events: Sequence[Coded]) -> list[Coded]:
     return [
         Coded(*(round(value, 5) if isinstance(value, float) else value for value in astuple(each))) for each in events
     ]
+
+
+def differences(seed: int) -> tuple[int, list[str]]:
+    """Number of events of a drawn timeline, and what only one of recognition and the coder has."""
+    timeline = Drawing(seed).timeline
+    told, coded = rounded(as_told(timeline.told())), rounded(Coder(timeline).events())
+    return len(coded), [
+        *(f"told  {each}" for each in told if each not in coded), *(f"coded {each}" for each in coded if each not in told)
+    ]  # fmt: skip

@@ -199,7 +199,9 @@ class Drawing:
             one.known = max(one.known, (until[0], until[1] + 1))
         self.timeline.spans.append(one)
         if len(self.timeline.people) > 1:
-            self.timeline.spans.append(Span(person, "look", (round(since[0] - 0.05, 6), 0), (round(until[0] + 0.05, 6), 0), to))
+            self.timeline.spans.append(
+                Span(person, "look", (round(since[0] - 0.05, 6), 0), (round(until[0] + 0.05, 6), 0), to)
+            )
 
     def _gesture(self, person: str, since: float, until: float) -> None:
         chance = self._chance
@@ -207,7 +209,9 @@ class Drawing:
             return
         action: Action = chance.choice(("nod", "nod", "shake", "point"))
         begins = self._at(self._between(since, until))
-        ends = self._at(min(begins[0] + self._between(0.2, 0.8), until + 0.05 if len(self.timeline.people) > 1 else 1e9))
+        ends = self._at(
+            min(begins[0] + self._between(0.2, 0.8), until + 0.05 if len(self.timeline.people) > 1 else 1e9)
+        )
         if ends[0] - begins[0] >= 0.1:
             self.timeline.spans.append(Span(person, action, begins, ends))
 
@@ -220,15 +224,18 @@ class Drawing:
             following = [each for each in spoken if at + 0.5 < each.until[0] < at + 6.0]
             if following and chance.random() < 0.6:
                 one = chance.choice(following)
-                to, at = one.who, max(at, one.until[0] + chance.choice((self._between(-0.5, 2.0), self._between(0, 6.0))))
+                to, at = (
+                    one.who,
+                    max(at, one.until[0] + chance.choice((self._between(-0.5, 2.0), self._between(0, 6.0)))),
+                )
             waiting = [each for each in self.timeline.turns if at < each.until[0] + LIMIT]
             if waiting and len(self.timeline.people) > 1:
                 kind = "asks"  # else it depends on what is known first: who answers, or that who was asked does not
             speech, over = [], at
             for _ in range(chance.choice((1, 1, 2)) if kind == "asks" else 1):
                 begins = self._at(over)
-                if len(self.timeline.people) > 1:
-                    begins = begins[0], -1
+                if len(self.timeline.people) > 1:  # not with somebody's words: that would be right either way
+                    begins = round(begins[0] + 0.003, 6), -1
                 over = begins[0] + self._between(0.5, 3.0)
                 speech.append((begins, self._at(over)))
                 over += self._between(0.2, 1.0)
