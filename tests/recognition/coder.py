@@ -26,7 +26,7 @@ LAST = 10**9
 
 
 class Coded(Struct, frozen=True, order=True):
-    """An event as both the coder and recognition have it. delay: None: there is none. late: an answer after the limit."""
+    """An event as both the coder and recognition have it. delay: None: none. late: of an answer after the limit."""
 
     kind: str
     initiator: str
@@ -305,6 +305,5 @@ def differences(seed: int) -> tuple[int, list[str]]:
     """Number of events of a drawn timeline, and what only one of recognition and the coder has."""
     timeline = Drawing(seed).timeline
     told, coded = rounded(as_told(timeline.told())), rounded(Coder(timeline).events())
-    return len(coded), [
-        *(f"told  {each}" for each in told if each not in coded), *(f"coded {each}" for each in coded if each not in told)
-    ]  # fmt: skip
+    only = [f"told  {each}" for each in told if each not in coded]
+    return len(coded), only + [f"coded {each}" for each in coded if each not in told]

@@ -1,4 +1,4 @@
-"""Phrases that people say while somebody else speaks, and what they mean by them: by ear, not from the lists of words.
+"""Phrases that people say while somebody else speaks, and what they mean by them: by ear, not from lists of words.
 
 `phrases.csv`: language, kind, words. Words are as a recognizer writes them; "": it writes none.
 """

@@ -1,4 +1,4 @@
-"""What is said into the robot's turn ends it, takes the floor, or lets it go on: each phrase of a table made by ear."""
+"""What is said into the robot's turn ends it, takes the floor, or lets it go on: phrases of a table made by ear."""
 
 from collections import Counter
 

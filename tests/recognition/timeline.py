@@ -42,7 +42,7 @@ class Span(Struct):
 
 
 class Turn(Struct):
-    """The robot's words to one person. kind: `asks` opens a pair, `replies` answers one, `listens` is announced feedback.
+    """The robot's words to one person. kind: `asks` opens a pair, `replies` answers one.
 
     speech: when it speaks; of a turn that asks `until` is its end, after the last word.
     """

@@ -236,10 +236,9 @@ class SessionScene:
         return True
 
     def is_contested(self, person: str, at: Seconds) -> bool:
-        """True if the robot waits for an answer, and somebody else, of whom it is not known to whom, began to speak first."""
-        return bool(self.asked) and any(
-            who != person and (since, who) < (at, person) for who, since in self.unknown.items()
-        )
+        """True if the robot asks somebody, and another began to speak before this, it is not known yet to whom."""
+        unknown = ((since, who) for who, since in self.unknown.items() if who != person)
+        return bool(self.asked) and any(each < (at, person) for each in unknown)
 
     def may_be_answered(self, person: str, until: Seconds) -> bool:
         """True if somebody else has begun to speak by then, of whom it is not known yet to whom it is."""

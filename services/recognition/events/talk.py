@@ -253,11 +253,10 @@ class Talk:
         """Tell all in line up to the next speech of which it is not known to whom it is."""
         while self._line:
             at, item = self._line[0]
-            if isinstance(item, OwnSpeech):
-                if item.to is None:
-                    if self._decided_at is None or self._decided_at > now:
-                        break
-                    self._likely(item, now)
+            if isinstance(item, OwnSpeech) and item.to is None:
+                if self._decided_at is None or self._decided_at > now:
+                    break
+                self._likely(item, now)
             if self._waits_for_others(at):
                 break
             self._line.popleft()
