@@ -1,8 +1,8 @@
 """Words of listeners: with them a person says "go on", and does not ask for the floor. Pure data.
 
-A list for each language, because length alone misjudges both ways: "stop" is as short as "yes", and "yes, yes,
-okay" is as long as a question. "No" is in none of them: it may mean stop. Nor are words with which one begins to speak, such
-as "well" and "but", nor thanks, with which one ends. What is part of many phrases stands alone: "that's", "very".
+A list for each language, because length alone misjudges both ways: "stop" is as short as "yes", and "yes, yes, okay"
+is as long as a question. "No" is in none of them: it may mean stop. Nor are words with which one begins to speak,
+such as "well" and "but", nor thanks, with which one ends. What is part of many phrases stands alone: "that's".
 """
 
 import re
