@@ -19,7 +19,7 @@ from tests.judge.generate import Kind
 from tests.judge.laws import LAWS, judge
 from tests.judge.shrinking import shrink
 from tests.judge.story import Story, read, write
-from tests.recognition import coder, gaze_coder
+from tests.recognition.test_coded_timelines import JUDGES
 
 DIGITS = 3
 
@@ -152,7 +152,7 @@ def replay(folder: Path) -> int:
 def judge_talk(first: int, runs: int, jobs: int, examples: int) -> int:
     """Compare what recognition tells of random talk with what a coder writes down, and print the differences."""
     numbers, failed = range(first, first + runs), 0
-    for name, differences in (("talk", coder.differences), ("looks", gaze_coder.differences)):
+    for name, (differences, _) in JUDGES.items():
         with ProcessPoolExecutor(jobs) as pool:
             found = list(pool.map(differences, numbers, chunksize=8))
         wrong = [(seed, differing) for seed, (_, differing) in zip(numbers, found, strict=True) if differing]

@@ -59,8 +59,8 @@ class Side:
 class Coder:
     """Reads a timeline from beginning to end; of each sign it knows all that is still to come."""
 
-    def __init__(self, timeline: Timeline) -> None:
-        self._timeline = timeline
+    def __init__(self, timeline: Timeline, limit: float = LIMIT) -> None:
+        self._timeline, self._limit = timeline, limit
         self._sides = {person: Side(person) for person in timeline.people}
         self._events: dict[tuple[str, str, str, float], Coded] = {}
         self._used: set[int] = set()
@@ -102,10 +102,10 @@ class Coder:
 
     def _expire(self, side: Side, now: float) -> None:
         """Let the limits pass that are over before `now`."""
-        if side.asked is not None and side.asked.until[0] + LIMIT + ROUND < now:
+        if side.asked is not None and side.asked.until[0] + self._limit + ROUND < now:
             self._pair_of(side.asked, "failed")
             side.asked, side.unanswered = None, side.asked
-        if side.own and side.own[-1].until[0] + LIMIT + ROUND < now:
+        if side.own and side.own[-1].until[0] + self._limit + ROUND < now:
             self._own_pair(side, "failed")
 
     def _leaves(self, side: Side, absence: Absence) -> None:
@@ -305,5 +305,10 @@ def differences(seed: int) -> tuple[int, list[str]]:
     """Number of events of a drawn timeline, and what only one of recognition and the coder has."""
     timeline = Drawing(seed).timeline
     told, coded = rounded(as_told(timeline.told())), rounded(Coder(timeline).events())
+    return only_one_has(told, coded)
+
+
+def only_one_has(told: Sequence[object], coded: Sequence[object]) -> tuple[int, list[str]]:
+    """Number of events that are coded, and those that differ."""
     only = [f"told  {each}" for each in told if each not in coded]
     return len(coded), only + [f"coded {each}" for each in coded if each not in told]

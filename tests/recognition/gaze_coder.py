@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from engage_hri.schemas.behaviors import EventKind
 from engage_hri.schemas.recognition import ConnectionEvent
+from tests.recognition.coder import only_one_has
 from tests.recognition.observations import HUMAN, ROBOT, Log
 
 OBJECTS = ("blue-square", "rectangle")
@@ -266,5 +267,4 @@ def differences(seed: int) -> tuple[int, list[str]]:
     """Number of events of a drawn timeline, and what only one of recognition and the coder has."""
     gazes = Gazes(seed)
     told, coded = gazes.told(), GazeCoder(gazes).events()
-    only = [f"told  {each}" for each in told if each not in coded]
-    return len(coded), only + [f"coded {each}" for each in coded if each not in told]
+    return only_one_has(told, coded)
