@@ -42,6 +42,7 @@ def test_a_full_turn_announces_the_pair_and_ends_with_a_look_at_the_face() -> No
         responder="human",
         cause="turn",
         optional=True,
+        anchors=("turn-gaze:stroke",),
         turn="turn",
         timing=(Timing("start", "turn-gaze:start"),),
         needs=("turn-gaze",),

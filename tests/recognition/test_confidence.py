@@ -30,6 +30,7 @@ def test_a_look_that_was_there_before_counts_with_its_own_confidence():
     log = Log()
     begins(log, "look", 0.5, 0.6, BLUE)
     log.requests_event("directed_gaze", 0.7, BLUE)
+    log.owner("fragment", "rectangle", 1.9)
     begins(log, "look", 2.0, 0.9, ROBOT)
     log.requests_event("mutual_facial_gaze", 3.0)
 

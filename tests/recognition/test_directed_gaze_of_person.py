@@ -73,10 +73,19 @@ a fragment that takes the head preempts what waits
     human's dg-1 at blue: started 1, preempted 1.5
     human's mfg-1: started 1.2, preempted 1.5
 
-the robot's own reference supersedes the person's direction
-    1 human +point blue; 1.5 asks dg blue
-    human's dg-1 at blue: started 1, superseded 1.5
-    robot's dg-2 at blue: started 1.5
+the robot's own reference adopts the person's direction
+    1 human +point blue; 1.5 asks dg blue; 1.9 robot +look blue
+    human's dg-1 at blue: started 1, succeeded 1.9 after 0.9, completed 1.9 lasting 0
+
+the robot's own reference begins when the person's direction ends in vain
+    1 human +point blue; 1.5 asks dg blue; 3.7 human +look blue
+    human's dg-1 at blue: started 1, failed 3.5 after 2.5
+    robot's dg-2 at blue: started 3.5 since 1.5, succeeded 3.7 after 2.2
+
+a person who leaves fails a request that waits for their direction
+    1 human +point blue; 1.1 lost human; 1.5 asks dg blue; 4 time
+    human's dg-1 at blue: started 1, withdrawn 3.1
+    robot's dg-2 at blue: started 3.1 since 1.5, failed 3.1 after 1.6
 
 at resolution table anything on it will do
     TARGET in table pink

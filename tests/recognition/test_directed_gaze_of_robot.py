@@ -99,10 +99,22 @@ directing anew to the same object supersedes the pending one
     robot's dg-1 at blue: started 1, superseded 2
     robot's dg-2 at blue: started 2
 
-directing anew during shared gaze completes it and succeeds at once
-    0.5 robot +look blue; 1 asks dg blue; 1.5 human +look blue; 2 asks dg blue
-    robot's dg-1 at blue: started 1, succeeded 1.5 after 0.5, completed 2 lasting 0.5
-    robot's dg-2 at blue: started 2, succeeded 2 after 0
+directing anew during shared gaze is answered by it
+    0.5 robot +look blue; 1 asks dg blue; 1.5 human +look blue; 2 asks dg blue; 3 human +look
+    robot's dg-1 at blue: started 1, succeeded 1.5 after 0.5, succeeded 2 after 0.5, completed 3 lasting 1.5
+
+person who is there first follows when the robot arrives
+    0.5 human +look blue; 1 asks dg blue anchors=gaze-1:stroke; 1.4 robot +look blue; 2 human +look
+    robot's dg-1 at blue: started 1, succeeded 1.4 after 0.4, completed 2 lasting 0.6
+
+person who is there first follows when the robot has pointed
+    0.5 human +look blue; 1 asks dg blue anchors=gaze-1:stroke,phrase-1:start; 1.3 robot +point blue; 2 human +look
+    robot's dg-1 at blue: started 1, succeeded 1.3 after 0.3, completed 2 lasting 0
+
+person who leaves before the robot has shown anything has not followed
+    0.5 human +look blue; 1 asks dg blue anchors=gaze-1:stroke; 1.2 human +look; 1.4 robot +look blue
+    1.4 passes gaze-1:stroke; 4 time
+    robot's dg-1 at blue: started 1, failed 3.9 after 2.9
 
 directed gazes at two objects are decided each for itself
     1 asks dg blue; 2 asks dg pink; 2.3 human +look pink; 3.5 time

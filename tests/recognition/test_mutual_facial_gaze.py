@@ -48,10 +48,20 @@ asking again supersedes the pending one
     robot's mfg-1: started 1, superseded 2
     robot's mfg-2: started 2
 
-asking during mutual gaze completes it and succeeds at once
-    0.5 robot +look human; 1 human +look robot; 2 asks mfg
-    human's mfg-1: started 1, succeeded 1 after 0, completed 2 lasting 1
-    robot's mfg-2: started 2, succeeded 2 after 0
+asking during mutual gaze is answered by it
+    0.5 robot +look human; 1 human +look robot; 2 asks mfg; 3 human +look table
+    human's mfg-1: started 1, succeeded 1 after 0, succeeded 2 after 0, completed 3 lasting 2
+
+what is asked for begins when the robot has arrived
+    0.5 owner fragment rectangle; 0.6 human +look robot; 1 asks mfg anchors=gaze-1:stroke; 1.4 robot +look human
+    human's mfg-1: started 0.6, preempted 0.6
+    robot's mfg-2: started 1, succeeded 1.4 after 0.4
+
+a person who has looked away before the robot arrives has not met it
+    0.5 owner fragment rectangle; 0.6 human +look robot; 1 asks mfg anchors=gaze-1:stroke; 1.2 human +look table
+    1.4 robot +look human; 1.4 passes gaze-1:stroke; 4 time
+    human's mfg-1: started 0.6, preempted 0.6
+    robot's mfg-2: started 1, failed 3.3 after 2.3
 """
 
 
@@ -81,10 +91,30 @@ facial gaze while a fragment looks elsewhere is preempted
     0.5 owner fragment blue; 1 human +look robot
     human's mfg-1: started 1, preempted 1
 
-the robot's request supersedes the person's wait
-    1 human +look robot; 1.5 asks mfg
-    human's mfg-1: started 1, superseded 1.5
-    robot's mfg-2: started 1.5, succeeded 1.5 after 0
+the robot's request adopts the person's wait
+    1 human +look robot; 1.5 asks mfg; 1.8 robot +look human
+    human's mfg-1: started 1, succeeded 1.8 after 0.8
+
+a request begins an event of its own when the person's wait ends in vain
+    1 human +look robot; 1.5 asks mfg anchors=gaze-1:stroke; 1.7 human +look table; 1.8 robot +look human
+    2 human +look robot
+    human's mfg-1: started 1, failed 1.7 after 0.7
+    robot's mfg-2: started 1.7 since 1.5, succeeded 2 after 0.5
+
+a request outlasts the limit of the person's wait
+    1 human +look robot; 1.5 asks mfg anchors=gaze-1:stroke; 3 robot +look human
+    human's mfg-1: started 1, failed 2.9 after 1.9
+    robot's mfg-2: started 2.9 since 1.5, succeeded 3 after 1.5
+
+an aborted turn withdraws a request that waits for the person's event
+    1 human +look robot; 1.5 asks mfg turn=turn-1; 1.6 turn aborted; 1.8 robot +look human
+    human's mfg-1: started 1, succeeded 1.8 after 0.8
+    robot's mfg-2: started 1.6 since 1.5, withdrawn 1.6
+
+of two requests that wait for the person's event the later one is adopted
+    1 human +look robot; 1.5 asks mfg; 1.6 asks mfg; 1.8 robot +look human
+    human's mfg-1: started 1, succeeded 1.8 after 0.8
+    robot's mfg-2: started 1.6 since 1.5, superseded 1.6
 
 a person's directed gaze ends mutual gaze
     0.5 robot +look human; 1 human +look robot; 2 human +point blue
@@ -97,8 +127,8 @@ a directed gaze of the robot ends mutual gaze
     robot's dg-1 at blue: started 2
 
 mutual gaze to which the robot never came ends with its block
-    0.5 human +look robot; 1 asks mfg; 2 block done
-    human's mfg-1: started 0.5, superseded 1
+    0.4 owner fragment rectangle; 0.5 human +look robot; 1 asks mfg; 2 block done
+    human's mfg-1: started 0.5, preempted 0.5
     robot's mfg-2: started 1, succeeded 1 after 0, completed 2 lasting 0
 """
 

@@ -361,9 +361,8 @@ class Emission:
             gaze = self.names.fresh("turn-gaze")
             closing.append(Gaze(id=gaze, target=turn.addressee, needs=self.hinge))
             start = f"{gaze}:start"
-            closing.append(
-                replace(self._event("turn-gaze-event", "mutual_facial_gaze", start, (gaze,)), optional=True)
-            )
+            event = self._event("turn-gaze-event", "mutual_facial_gaze", start, (gaze,))
+            closing.append(replace(event, optional=True, anchors=(f"{gaze}:stroke",)))
             if len(ends) > 1 or (ends and looks):
                 operators += [after(end, f"{gaze}:start") for end in ends]
             elif ends:

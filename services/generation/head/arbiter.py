@@ -69,6 +69,7 @@ class Shift(Struct, frozen=True):
             responder=self.target,
             cause="maintenance",
             optional=True,
+            anchors=("shift:end",),
             timing=(Timing("start", "shift:start"),),
         )
         return Block(id=self.id, behaviors=(shift, event))

@@ -136,9 +136,12 @@ class TurnEvents:
         self._turn_of[block] = turn
 
     def feed(self, event: ConnectionEvent, now: Seconds) -> None:
-        # An event that is first heard of in a later state belongs to an earlier performance under the same id.
-        if event.block in self._turn_of and (event.state == "started" or event.id in self._events):
-            if not event.retold:
+        # An event that is first heard of in a later state belongs to an earlier performance under the same id, unless a
+        # request of this one has adopted it (decision 0187).
+        is_known = event.id in self._events
+        is_adopted = event.state == "succeeded" and (event.cause == "human" or event.retold)
+        if event.block in self._turn_of and (event.state == "started" or is_known or is_adopted):
+            if not event.retold or not is_known:
                 self._changed[event.id] = now
             self._events[event.id] = replace(event, retold=False)
 

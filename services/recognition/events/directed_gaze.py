@@ -27,7 +27,6 @@ TABLE = table(
     TransitionRow(HUMAN_DIRECTING, "limit", IDLE, ("failed",)),
     TransitionRow(HUMAN_DIRECTING, "person_gone", IDLE, ("withdrawn",)),
     TransitionRow(HUMAN_DIRECTING, "fragment_takes_head", IDLE, ("preempted",)),
-    TransitionRow(HUMAN_DIRECTING, "supersede", IDLE, ("superseded",)),
     TransitionRow(SHARED, "part", IDLE, ("completed",)),
     TransitionRow(SHARED, "supersede", IDLE, ("completed",)),
     TransitionRow(SHARED, "person_gone", IDLE, ("completed",)),

@@ -27,7 +27,6 @@ TABLE = table(
     TransitionRow(HUMAN_WAITING, "human_leaves", IDLE, ("failed",)),
     TransitionRow(HUMAN_WAITING, "fragment_takes_head", IDLE, ("preempted",)),
     TransitionRow(HUMAN_WAITING, "person_gone", IDLE, ("withdrawn",)),
-    TransitionRow(HUMAN_WAITING, "supersede", IDLE, ("superseded",)),
     TransitionRow(MUTUAL, "part", IDLE, ("completed",)),
     TransitionRow(MUTUAL, "directed_gaze_begins", IDLE, ("completed",)),
     TransitionRow(MUTUAL, "supersede", IDLE, ("completed",)),
@@ -47,5 +46,7 @@ class MutualFacialGaze(SharedGaze):
         """End the mutual gaze because a directed gaze takes the eyes elsewhere; the robot withdraws its request."""
         if self.state == MUTUAL:
             self._part("directed_gaze_begins", at)
+        elif by_robot and self._asked is not None:
+            self._drop("withdrawn", at)
         elif self.state == ROBOT_WAITING and by_robot:
             self.step("withdraw", at)

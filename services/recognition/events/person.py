@@ -307,18 +307,22 @@ class PersonRecognition:
         self.forget_idle(at)
 
     def robot_directs(self, event: OngoingEvent, clock: LimitClock) -> None:
-        for one in self.directed:
-            if set(one.objects) == set(event.objects):
-                one.supersede(event.started)
-        self.forget_idle(event.started)
-        self.facial.directed_gaze_begins(event.started, by_robot=True)
-        one = DirectedGaze(self._writer, event.objects)
-        self.directed.append(one)
         there = self._scene.person_looks_at(self.gaze, event.objects)
-        self.gaze.spent = self.gaze.spent or there
         robot_on = self._scene.robot_looks_at(event.objects)
+        self.facial.directed_gaze_begins(event.started, by_robot=True)
+        self.gaze.spent = self.gaze.spent or there
+        one = next((one for one in self.directed if set(one.objects) == set(event.objects)), None)
+        if one is None:
+            one = DirectedGaze(self._writer, event.objects)
+            self.directed.append(one)
         one.robot_begins(event, clock, robot_on=robot_on, look=self.gaze if there else None)
         self.forget_idle(event.started)
+
+    def robot_points(self, targets: tuple[str, ...], at: Seconds) -> None:
+        for one in self.directed:
+            if set(one.objects) & set(targets):
+                one.robot_points(at)
+        self.forget_idle(at)
 
     def _expire_directed(self, one: DirectedGaze, at: Seconds) -> None:
         one.expire(at)
@@ -335,21 +339,20 @@ class PersonRecognition:
     def point_realised(self, block: str, name: str, at: Seconds) -> None:
         """Take a realised sync point of a block of the robot: time limits may run from there."""
         for machine in self.gaze_machines():
-            if machine.clock is not None and machine.event is not None and machine.event.block == block:
-                machine.clock.realised(name, at)
+            machine.realised(block, name, at)
+        self.forget_idle(at)
 
     def abort(self, at: Seconds, *, turn: str) -> None:
         """Withdraw the events that the robot began in a turn that was cut off."""
         self.talk.take(at, lambda talk: talk.abort(at, turn=turn))
         for machine in self.gaze_machines():
-            if machine.event is not None and turn and machine.event.turn == turn:
-                machine.block_ended(at, aborted=True)
+            if turn:
+                machine.abort(turn, at)
         self.forget_idle(at)
 
     def block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
         for machine in self.gaze_machines():
-            if machine.event is not None and machine.event.block == block:
-                machine.block_ended(at, aborted=aborted)
+            machine.block_ended(block, at, aborted=aborted)
         self.forget_idle(at)
         self.talk.take(at, lambda talk: talk.block_ended(block, at, aborted=aborted))
 
@@ -363,8 +366,7 @@ class PersonRecognition:
             self.talk.take(at, lambda talk: talk.withdraw(event, at, is_orphan=is_orphan))
             return
         for machine in self.gaze_machines():
-            if machine.event is event:
-                machine.step("withdraw", at)
+            machine.withdraw(event, at)
         self.forget_idle(at)
 
     def _is_recent(self, past: _Directed, at: Seconds) -> bool:
@@ -373,7 +375,6 @@ class PersonRecognition:
     # -- mutual facial gaze -------------------------------------------------------------------------------------
 
     def robot_looks_at_face(self, event: OngoingEvent, clock: LimitClock) -> None:
-        self.facial.supersede(event.started)
         robot_on = self._scene.robot_looks_at((self.id,))
         self.facial.robot_begins(event, clock, robot_on=robot_on, look=self.gaze if self.on_robots_face else None)
 

@@ -1,14 +1,28 @@
 """The base of both gaze events: one begins, the other joins, and the shared phase lasts while both look there.
 
 Thesis 2.2.1-2. The names of states and inputs are data of the subclasses; their tables have the transitions.
+
+A look begins with its arrival, for both sides. A person may follow the words before the robot's head is there; the
+event succeeds when the robot shows its target, too. And two who look at each other meet once: if the robot asks for
+a look while the person's own look waits for it, the request waits for what becomes of that. If they meet, this is the
+event that was asked for; if they don't, the request begins an event of its own (decision 0187).
 """
 
-from typing import ClassVar
+from collections.abc import Callable
+from typing import ClassVar, NamedTuple
 
+from engage_hri.schemas.recognition import EventState
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.events.limits import LimitClock
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, Machine, OngoingEvent
 from engage_hri.services.recognition.events.scene import GazeState
+
+
+class _Asked(NamedTuple):
+    """An event that the robot has asked for, with the clock of its limit."""
+
+    event: OngoingEvent
+    clock: LimitClock
 
 
 class SharedGaze(Machine):
@@ -29,34 +43,58 @@ class SharedGaze(Machine):
     def __init__(self, writer: EventWriter) -> None:
         super().__init__(writer)
         self.by_robot = False
-        self.clock: LimitClock | None = None
-        self._robot_on = self._human_on = self._robot_came = False
+        self._clock: LimitClock | None = None
+        self._robot_on = self._human_on = self._robot_came = self._robot_pointed = False
         self._shared_since: Seconds | None = None
+        self._confidence: Probability = 1.0
+        """Confidence of the person's present look."""
+        self._asked: _Asked | None = None
+        """What the robot has asked for while the person waits."""
 
     @property
     def deadline(self) -> Seconds | None:
-        if self.clock is None or self.state not in (self.ROBOT_WAITS, self.HUMAN_WAITS):
+        if self._clock is None or self.state not in (self.ROBOT_WAITS, self.HUMAN_WAITS):
             return None
-        return self.clock.deadline
+        return self._clock.deadline
 
     @property
     def is_shared(self) -> bool:
         """True while both look there."""
         return self.state == self.TOGETHER and self._shared_since is not None
 
+    @property
+    def _is_shown(self) -> bool:
+        """True if the robot has shown its target: it looks or points there, or no anchor is waited for any more."""
+        return self._robot_came or self._robot_pointed or self._clock is None or not self._clock.waiting
+
     def expire(self, at: Seconds) -> None:
         """Decide the event at its deadline: the limit has passed, or the robot has never shown its target."""
-        never_shown = self.clock is not None and self.clock.waiting
+        never_shown = self._clock is not None and self._clock.waiting
         self.step("withdraw" if never_shown else "limit", at)
 
+    # -- beginnings ---------------------------------------------------------------------------------------------
+
     def robot_begins(self, event: OngoingEvent, clock: LimitClock, *, robot_on: bool, look: GazeState | None) -> None:
-        """Begin the event by the robot's request. look: the person's, if it is on the target already."""
-        self._begin(event, clock, by_robot=True, robot_on=robot_on, human_on=look is not None)
-        if look is None:
-            self.step(self.ROBOT_BEGINS, event.started)
+        """Begin the event by the robot's request, or adopt that of the person.
+
+        look: the person's, if it is on the target already.
+        """
+        at = event.started
+        if self.event is not None and self.is_shared:
+            self._adopt(event)
+            self._writer.publish(self.event, "succeeded", at, retold=True)
+        elif self.state == self.HUMAN_WAITS:
+            if self._asked is not None:
+                self._drop("superseded", at)
+            self._asked = _Asked(event, clock)
         else:
-            given = f"{self.ROBOT_BEGINS}_{self.TOGETHER}"
-            self._join(given, max(event.started, look.since), confidence=look.confidence)
+            self._close("supersede", at)
+            self._begin(event, clock, by_robot=True, robot_on=robot_on, human_on=look is not None)
+            if look is not None and self._is_shown:
+                self._join(f"{self.ROBOT_BEGINS}_{self.TOGETHER}", max(at, look.since), confidence=look.confidence)
+            else:
+                self._confidence = 1.0 if look is None else look.confidence
+                self.step(self.ROBOT_BEGINS, at)
 
     def human_begins(
         self,
@@ -74,6 +112,7 @@ class SharedGaze(Machine):
         the head elsewhere.
         """
         clock = LimitClock(event.started, limit)
+        self._confidence = event.confidence
         self._begin(event, clock, by_robot=False, robot_on=robot_since is not None, human_on=human_on)
         if robot_since is not None:
             self._join(f"{self.HUMAN_BEGINS}_{self.TOGETHER}", at, came=robot_since)
@@ -83,27 +122,69 @@ class SharedGaze(Machine):
     def _begin(
         self, event: OngoingEvent, clock: LimitClock, *, by_robot: bool, robot_on: bool, human_on: bool
     ) -> None:
-        self.event, self.clock, self.by_robot = event, clock, by_robot
+        self.event, self._clock, self.by_robot = event, clock, by_robot
         self._robot_on = self._robot_came = robot_on
-        self._human_on, self._shared_since = human_on, None
+        self._human_on, self._robot_pointed, self._shared_since = human_on, False, None
+
+    def step(self, given: str, at: Seconds) -> None:
+        """Take one transition. What the robot has asked for begins if the person's event has ended without it."""
+        super().step(given, at)
+        if self.state == IDLE and self._asked is not None:
+            (event, clock), self._asked = self._asked, None
+            self._begin(event, clock, by_robot=True, robot_on=self._robot_on, human_on=self._human_on)
+            super().step(self.ROBOT_BEGINS, at)
+            self._follow(at)
+
+    def _adopt(self, asked: OngoingEvent) -> None:
+        """Let the present event be the one that the robot has asked for."""
+        assert self.event is not None
+        self.event.request, self.event.turn = asked.request, asked.turn
+        self.event.block, self.event.behavior = asked.block, asked.behavior
+
+    def _drop(self, state: EventState, at: Seconds) -> None:
+        """Tell of an event that was asked for, and will not begin any more."""
+        assert self._asked is not None
+        event, self._asked = self._asked.event, None
+        self._writer.publish(event, "started", at)
+        self._writer.publish(event, state, at)
+
+    # -- what happens -------------------------------------------------------------------------------------------
 
     def gazes(self, *, robot_on: bool, human_on: bool, at: Seconds, confidence: Probability = 1.0) -> None:
         """Take a change of gaze: True for each of the two that looks there now. confidence: of the person's look."""
         if self.event is None:
             return
         robot_left, human_left = self._robot_on and not robot_on, self._human_on and not human_on
-        self._robot_on, self._human_on = robot_on, human_on
+        self._robot_on, self._human_on, self._confidence = robot_on, human_on, confidence
         self._robot_came = self._robot_came or robot_on
-        if self.state == self.ROBOT_WAITS and human_on:
-            self._join(self.HUMAN_JOINS, at, confidence=confidence)
-        elif self.state == self.HUMAN_WAITS and robot_on:
-            self._join(self.ROBOT_JOINS, at)
-        elif self.state == self.ROBOT_WAITS and robot_left:
+        if self.state == self.ROBOT_WAITS and robot_left and not human_on:
             self.step("robot_leaves", at)
-        elif self.state == self.HUMAN_WAITS and human_left:
+        elif self.state == self.HUMAN_WAITS and human_left and not robot_on:
             self.step("human_leaves", at)
         elif self.state == self.TOGETHER:
             self._share(at)
+        else:
+            self._follow(at)
+
+    def robot_points(self, at: Seconds) -> None:
+        """Take a gesture of the robot that shows the target, whether or not it looks there."""
+        self._robot_pointed = True
+        self._follow(at)
+
+    def realised(self, block: str, name: str, at: Seconds) -> None:
+        """Take a realised sync point of a block of the robot: time limits may run from there."""
+        if self._asked is not None and self._asked.event.block == block:
+            self._asked.clock.realised(name, at)
+        if self.event is not None and self.event.block == block and self._clock is not None:
+            self._clock.realised(name, at)
+        self._follow(at)
+
+    def _follow(self, at: Seconds) -> None:
+        """Let the responder join who is there, now that the initiator has shown where to look."""
+        if self.state == self.ROBOT_WAITS and self._human_on and self._is_shown:
+            self._join(self.HUMAN_JOINS, at, confidence=self._confidence)
+        elif self.state == self.HUMAN_WAITS and (self._robot_on or self._robot_pointed):
+            self._join(self.ROBOT_JOINS, at)
 
     def _join(self, given: str, at: Seconds, came: Seconds | None = None, confidence: Probability = 1.0) -> None:
         """Let the responder join. came: start of its look, if not `at`. confidence: of that look."""
@@ -111,6 +192,9 @@ class SharedGaze(Machine):
         self.event.rests_on(confidence)
         together_since = max(at if came is None else came, self.event.started)
         self.event.delay = together_since - self.event.started
+        if self._asked is not None:
+            self._adopt(self._asked.event)
+            self._asked = None
         self.step(given, at)
         self._share(together_since)
 
@@ -121,6 +205,8 @@ class SharedGaze(Machine):
         elif self._shared_since is not None or not self._human_on or self._robot_came:
             self._part("part", at)
 
+    # -- endings ------------------------------------------------------------------------------------------------
+
     def _part(self, given: str, at: Seconds, until: Seconds | None = None) -> None:
         """End the shared phase. until: time at which it was last seen, if not `at`."""
         assert self.event is not None
@@ -128,20 +214,38 @@ class SharedGaze(Machine):
         self.event.duration = 0.0 if since is None else max(0.0, (at if until is None else until) - since)
         self.step(given, at)
 
-    def block_ended(self, at: Seconds, *, aborted: bool) -> None:
+    def block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
         """End the robot's part: an aborted fragment withdraws its event; a shared phase that lacks its gaze ends."""
-        if self.clock is not None:
-            self.clock.stop_waiting(at)
-        if self.state == self.ROBOT_WAITS and aborted:
-            self.step("withdraw", at)
-        elif self.state == self.TOGETHER and not self._robot_on:
-            self._part("part", at)
+        self._robots_part_ends(lambda event: event.block == block, at, aborted=aborted)
 
-    def supersede(self, at: Seconds) -> None:
-        """End the event because the robot begins anew: a shared phase completes, a pending event is superseded."""
-        self._close("supersede", at)
+    def abort(self, turn: str, at: Seconds) -> None:
+        """Withdraw what the robot began in a turn that was cut off."""
+        self._robots_part_ends(lambda event: event.turn == turn, at, aborted=True)
+
+    def _robots_part_ends(self, concerns: Callable[[OngoingEvent], bool], at: Seconds, *, aborted: bool) -> None:
+        if self._asked is not None and concerns(self._asked.event):
+            self._asked.clock.stop_waiting(at)
+            if aborted:
+                self._drop("withdrawn", at)
+        if self.event is not None and concerns(self.event):
+            if self._clock is not None:
+                self._clock.stop_waiting(at)
+            if self.state == self.ROBOT_WAITS and aborted:
+                self.step("withdraw", at)
+            elif self.state == self.TOGETHER and not self._robot_on:
+                self._part("part", at)
+        self._follow(at)
+
+    def withdraw(self, event: OngoingEvent, at: Seconds) -> None:
+        """Withdraw this event of the robot."""
+        if self._asked is not None and self._asked.event is event:
+            self._drop("withdrawn", at)
+        elif self.event is event:
+            self.step("withdraw", at)
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
+        if self._asked is not None:
+            self._drop("failed", at)
         self._close("person_gone", at, until)
 
     def _close(self, given: str, at: Seconds, until: Seconds | None = None) -> None:
