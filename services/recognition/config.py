@@ -38,7 +38,7 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Time limit, from the latest of the event's start, gaze on target, point stroke and phrase start."""
     mutual_facial_gaze_limit: Seconds = 1.9
     """Time limit; the longest failed one in Table 2.1 is 1.8 s."""
-    adjacency_pair_limit: Seconds = 4.0
+    adjacency_pair_limit: Seconds = 4.5
     """Time limit from the end of the turn, for an answer in words or gestures. In a public study of turn-taking 96 of
     100 people answered a product robot within it, and half of them within 1.5 s."""
     third_turn_limit: Seconds = 1.5

@@ -1,17 +1,31 @@
 """Words of listeners: with them a person says "go on", and does not ask for the floor. Pure data.
 
 A list for each language, because length alone misjudges both ways: "stop" is as short as "yes", and "yes, yes, okay"
-is as long as a question. "No" is in none of them: it may mean stop.
+is as long as a question. "No" is in none of them: it may mean stop. Nor are words with which one begins to speak,
+such as "well" and "but", nor thanks, with which one ends. What is part of many phrases stands alone: "that's".
 """
 
 import re
 
 BY_LANGUAGE = {
-    "en": "uh-huh, mhm, mm-hmm, mm, hm, huh, uh, um, ah, oh, aha, yes, yeah, yep, yup, ok, okay, right, all right, "
-    "alright, sure, of course, exactly, true, good, fine, great, nice, wow, really, i see, got it, i know, indeed, "
-    "interesting, cool, haha, ha, lol",
-    "de": "ja, jaja, jo, genau, okay, aha, ach, ach so, achso, mhm, hm, stimmt, gut, klar, na klar, verstehe, "
-    "ich verstehe, richtig, sicher, natürlich, schön, echt, eben, alles klar",
+    "en": "uh-huh, mhm, mm-hmm, mm, hm, huh, uh, uhm, um, er, erm, ah, oh, ooh, aha, yes, yeah, yep, yup, aye, ok, "
+    "okay, okey-dokey, right, all right, alright, sure, sure thing, for sure, of course, naturally, "
+    "certainly, obviously, exactly, precisely, absolutely, definitely, totally, indeed, true, so true, "
+    "correct, agreed, i agree, you're right, very, quite, pretty, that, that's, that is, it's, sounds, how, "
+    "good, nice, fine, great, lovely, perfect, excellent, brilliant, awesome, amazing, wonderful, fantastic, "
+    "beautiful, interesting, cool, funny, fair, fair enough, makes sense, good to know, wow, whoa, gosh, "
+    "goodness, my goodness, oh my, my god, no way, no kidding, you don't say, really, is that so, i see, oh i "
+    "see, i know, i understand, i get it, got it, gotcha, understood, go on, go ahead, carry on, keep going, "
+    "continue, please continue, please go on, tell me more, i'm listening, haha, ha, hehe, heh, lol",
+    "de": "ja, jaja, jo, jep, jup, jawohl, genau, ganz genau, okay, ah, oh, äh, ähm, öh, aha, ach, ach so, achso, "
+    "ach ja, ach komm, ach wirklich, mhm, hmhm, hm, stimmt, das stimmt, gut, klar, na klar, na gut, naja, na "
+    "ja, verstehe, versteh, ich verstehe, verstanden, ich weiß, weiß ich, kapiert, richtig, sicher, bestimmt, "
+    "natürlich, selbstverständlich, logisch, freilich, absolut, definitiv, auf jeden fall, einverstanden, in "
+    "ordnung, passt, geht klar, das, das ist, sehr, wie, schön, wahr, toll, super, prima, perfekt, wunderbar, "
+    "klasse, krass, cool, wow, interessant, spannend, lustig, echt, wirklich, tatsächlich, eben, alles klar, "
+    "soso, so so, ach was, sag bloß, oje, oh je, meine güte, mein gott, du hast recht, da hast du recht, "
+    "weiter, erzähl weiter, mach weiter, red weiter, sprich weiter, nur weiter, und weiter, ich höre, ich "
+    "höre zu, haha, hihi, hehe",
     "fr": "oui, ouais, d'accord, ah, ah bon, bon, bien, hum, exact, exactement, voilà, je vois, bien sûr, c'est ça",
     "es": "sí, claro, vale, ajá, ya, bueno, bien, exacto, entiendo, ya veo, de acuerdo, por supuesto",
     "it": "sì, certo, va bene, ho capito, capisco, esatto, già, bene, bello, d'accordo",
@@ -30,9 +44,19 @@ def is_listening(text: str) -> bool:
     return bool(said) and _LISTENER.fullmatch(said) is not None
 
 
+def has_words(text: str) -> bool:
+    """True if somebody has said a word; a recognizer writes noises as signs or in brackets: "..." or "[laughter]"."""
+    return bool(_plain(text))
+
+
 def _plain(text: str) -> str:
-    """Lower case, one blank between words, no signs, no letter twice in a row: "Hmm, mm-hmm!" is "hm m hm"."""
-    return re.sub(r"(\w)\1+", r"\1", " ".join(re.findall(r"\w+", text.casefold())))
+    """Lower case, one blank between words, no signs, no letter twice in a row, no syllable more often than twice.
+
+    "Hmm, mm-hmm!" is "hm m hm", "hahahaha" is "haha". What stands in brackets is no word: "(coughs) yes" is "yes".
+    """
+    said = re.sub(r"\[[^]]*\]|\([^)]*\)|\*[^*]*\*|<[^>]*>", " ", text.casefold().replace("’", "'"))
+    said = re.sub(r"(\w)\1+", r"\1", " ".join(re.findall(r"\w+", said)))
+    return re.sub(r"\b(\w{2,3})\1+(\w?)\b", r"\1\1", said)
 
 
 def _pattern() -> re.Pattern[str]:

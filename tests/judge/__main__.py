@@ -19,6 +19,7 @@ from tests.judge.generate import Kind
 from tests.judge.laws import LAWS, judge
 from tests.judge.shrinking import shrink
 from tests.judge.story import Story, read, write
+from tests.recognition.test_coded_timelines import JUDGES
 
 DIGITS = 3
 
@@ -148,6 +149,20 @@ def replay(folder: Path) -> int:
     return 1 if found else 0
 
 
+def judge_talk(first: int, runs: int, jobs: int, examples: int) -> int:
+    """Compare what recognition tells of random talk with what a coder writes down, and print the differences."""
+    numbers, failed = range(first, first + runs), 0
+    for name, (differences, _) in JUDGES.items():
+        with ProcessPoolExecutor(jobs) as pool:
+            found = list(pool.map(differences, numbers, chunksize=8))
+        wrong = [(seed, differing) for seed, (_, differing) in zip(numbers, found, strict=True) if differing]
+        print(f"{runs} timelines of {name}, {sum(count for count, _ in found)} events; {len(wrong)} timelines differ")
+        for seed, differing in wrong[:examples]:
+            print(f"timeline {seed}", *differing, sep="\n  ")
+        failed += len(wrong)
+    return 1 if failed else 0
+
+
 def parsed(arguments: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m tests.judge", description=__doc__)
     parser.add_argument("--runs", type=int, default=200, help="number of stories")
@@ -157,6 +172,7 @@ def parsed(arguments: list[str]) -> argparse.Namespace:
     kinds.add_argument("--streams", dest="kind", action="store_const", const="streams", help="several blocks each")
     kinds.add_argument("--sentences", dest="kind", action="store_const", const="sentences", help="untimed sentences")
     kinds.add_argument("--webs", dest="kind", action="store_const", const="webs", help="blocks tied to each other")
+    kinds.add_argument("--talk", action="store_true", help="talk and looks of people (not blocks)")
     kinds.add_argument("--crowds", dest="kind", action="store_const", const="crowds", help="many small blocks")
     parser.set_defaults(kind="alone")
     parser.add_argument("--faults", action="store_true", help="a body that is slow, stalls, fails, loses reports")
@@ -174,6 +190,8 @@ def main(arguments: list[str]) -> int:
     options = parsed(arguments)
     if options.story:
         return replay(Path(options.story))
+    if options.talk:
+        return judge_talk(options.first, options.runs, options.jobs, options.examples)
     one = partial(run, seed=options.seed, kind=cast(Kind, options.kind), faults=options.faults, holds=options.holds)
     numbers = range(options.first, options.first + options.runs)
     if options.jobs > 1:

@@ -134,6 +134,11 @@ class AdjacencyPair(Machine):
         """
         if self.state == HUMAN_WAITING and self._turn_end is None:
             self._answer("robot_answers", "speak", at)
+        return self.is_cut_into
+
+    @property
+    def is_cut_into(self) -> bool:
+        """True if the robot has begun its answer, and the person still speaks."""
         return self.state == INTERRUPTED and not self._by_robot
 
     def human_asks(self, event: OngoingEvent, action: Action) -> None:
@@ -221,6 +226,11 @@ class AdjacencyPair(Machine):
         self.step("one_of_several_answers" if is_asked else "other_answers", at)
 
     # -- second turn --------------------------------------------------------------------------------------------
+
+    @property
+    def may_be_answered(self) -> bool:
+        """True if the robot asks, or waits for an answer of the person."""
+        return self.state == ROBOT_WAITING
 
     def may_be_answered_with(self, action: Action) -> bool:
         """True if the robot waits for an answer of the person, and `action` is one."""
@@ -319,9 +329,10 @@ class AdjacencyPair(Machine):
     def _end_response(self, given: str, at: Seconds, until: Seconds | None = None) -> None:
         assert self.event is not None
         end = self._response_until if until is None else until
-        self.event.duration = max(0.0, (at if end is None else end) - self._response_since)
+        end = at if end is None else end
+        self.event.duration = max(0.0, end - self._response_since)
         self._third_turn_of = self.event.initiator
-        self._third_turn_until = at + self._third_turn
+        self._third_turn_until = end + self._third_turn
         self.step(given, at)
 
     def repaired(self, at: Seconds) -> None:

@@ -9,14 +9,14 @@ from engage_hri.schemas.behaviors import Action, Cause
 from engage_hri.schemas.recognition import InterjectionReading
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.adjacency_pair import AdjacencyPair
+from engage_hri.services.recognition.events.adjacency_pair import INTERRUPTED, RESPONDING, AdjacencyPair
 from engage_hri.services.recognition.events.backchannel import BRIEF, UNDECIDED, Backchannel
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.limits import in_time
 from engage_hri.services.recognition.events.listener_sign import WORDS_WAIT, ListenerSign, SignPart
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import SessionScene
-from engage_hri.services.text.listening import is_listening
+from engage_hri.services.text.listening import has_words, is_listening
 
 TURN_PATIENCE: Seconds = 12.0
 """Time after the robot's last word for which its unfinished turn still counts; longer than the silence after which
@@ -148,6 +148,8 @@ class Conversation:
 
     def gestures(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> None:
         """Take a nod, a shake or a point of the person."""
+        if self.holds_floor and (self._sign is None or not self._sign.going_on("speak")):
+            return  # it goes with the person's own words, and says nothing more
         if self.robot_holds_floor:
             self._signs(action, at, confidence)
         elif not self.pair.human_begins(action, at, confidence):
@@ -211,7 +213,7 @@ class Conversation:
             return  # a point in the robot's turn directs the gaze, and says nothing
         event = self._backchannel(self._scene.robot, self.id, sign.since, sign.confidence)
         for speech in sign.speeches:
-            is_noise = self.id in self._scene.worded and not self._writer.text_of(self.id, speech.since)
+            is_noise = self.id in self._scene.worded and not has_words(self._writer.text_of(self.id, speech.since))
             self._writer.interject(self.id, speech.since, "noise" if is_noise else "backchannel", until)
         if sign.speeches:
             event.spoken = tuple(speech.since for speech in sign.speeches)
@@ -225,7 +227,6 @@ class Conversation:
         if part.action == "speak":
             self._writer.interject(self.id, part.since, reading, at)
             self._human_turn(part.since, "speak", part.confidence)
-            self.understand(part.since, at)
         elif self.pair.human_begins(part.action, part.since, part.confidence) and part.until is not None:
             self.pair.ends(part.action, part.until, by_robot=False)
 
@@ -263,9 +264,11 @@ class Conversation:
                 pair.ends("speak", self._brief[1], by_robot=False)
 
     def _listens(self, since: Seconds) -> bool | None:
-        """True if the words of a speech are a listener's; None: they are unknown, or the robot's turn is over."""
-        words = self._writer.text_of(self.id, since)
-        return is_listening(words) if words and self.robot_holds_floor else None
+        """True if the words of a speech are a listener's; None: they are unknown, or not said to the robot's turn."""
+        words, event = self._writer.text_of(self.id, since), self.pair.event
+        if not has_words(words) or not self.robot_holds_floor or (event is not None and since < event.started):
+            return None
+        return is_listening(words)
 
     def resumes(self, event: OngoingEvent, at: Seconds) -> None:
         """Go on with a pair of a former life of recognition."""
@@ -290,6 +293,8 @@ class Conversation:
         pair = self.pair
         if pair.human_begins(action, at, confidence):
             pass
+        elif pair.state in (INTERRUPTED, RESPONDING):
+            return  # it is part of this exchange
         elif self._scene.answers_for_another(self.id, action, at, after=pair.asked_until):
             pair.forget_unanswered()
         elif pair.answers_late(action, at, confidence) or pair.human_goes_on(action, at):
@@ -313,7 +318,7 @@ class Conversation:
         self.robot_speaks_now = True
         self.pair.robot_heard(None)
         if self.holds_floor and not self.pair.robot_holds_turn:
-            if self.robot_backchannel.state != BRIEF:
+            if self.robot_backchannel.state != BRIEF and not self.pair.is_cut_into:
                 self.robot_backchannel.speaks(self._backchannel(self.id, self._scene.robot, at))
         elif not listens:
             self.pair.robot_begins("speak", at)
@@ -375,6 +380,8 @@ class Conversation:
         """Take the robot's second turn, or a third one that repairs. Either answers a waiting person."""
         if repairs:
             self.pair.repaired(at)
+        if self.robot_backchannel.state == UNDECIDED:
+            self.robot_backchannel.takes_floor("outlasts_turn", at)
         self.pair.robot_begins("speak", at)
         self.pair.forget_unanswered()
 

@@ -29,7 +29,8 @@ class People:
         """Time of the last sign of each person who has gone or is not reported as present. The longest ago first."""
         self._met = 0
         self._unknown: dict[str, Seconds] = {}
-        """`scene.unknown` when the deadlines of those who were asked were last updated."""
+        self._asked: set[str] = set()
+        """`scene.unknown` and `scene.asked` when the deadlines of those who were asked were last updated."""
         self.touched: set[str] = set()
         """Persons whose contact with the robot may have changed since somebody emptied this."""
         self._silences = 0
@@ -133,14 +134,26 @@ class People:
     def _follow(self, at: Seconds) -> None:
         """Tell the others what follows for them from a step.
 
-        Those who were asked are told that somebody else has answered in their place, or may yet do so; and all, that
+        Those who were asked are told that somebody else has answered in their place, or may yet do so. What has
+        waited until it is known to whom somebody else speaks goes on, the earliest first. And all are told that
         others are silent: while one speaks, looks of all but that one direct nothing.
         """
         scene = self._scene
-        if self._unknown != scene.unknown:
-            self._unknown = {**scene.unknown}
+        self._tell_taken_up(at)
+        while (self._unknown, self._asked) != (scene.unknown, scene.asked):
+            self._unknown, self._asked = {**scene.unknown}, {*scene.asked}
             for id in [*scene.questions]:
                 self._update(self.persons[id])
+            for id in sorted(self._unknown, key=lambda id: (self._unknown[id], id)):
+                self._apply(self.persons[id], at, lambda person: person.talk.go_on(at))
+                self._tell_taken_up(at)
+        if self._silences != scene.silences:
+            self._silences = scene.silences
+            self._looks_may_direct(at)
+
+    def _tell_taken_up(self, at: Seconds) -> None:
+        """Tell those who were asked that somebody else has answered in their place, or for all who were asked."""
+        scene = self._scene
         while scene.taken_up:
             taken_up = scene.taken_up.pop()
             if taken_up.asked in self.persons:
@@ -149,9 +162,6 @@ class People:
             told = partial(_answered_for_all, *self._writer.answered.pop())
             for person in list(self._here.values()):
                 self._apply(person, at, told)
-        if self._silences != scene.silences:
-            self._silences = scene.silences
-            self._looks_may_direct(at)
 
     def _looks_may_direct(self, at: Seconds) -> None:
         """Update the deadlines of those whose looks may direct the robot's now, for what all share has changed."""
@@ -177,6 +187,7 @@ class People:
             scene.questions[id] = question
         elif id in scene.questions:
             del scene.questions[id]
+        (scene.asked.add if person.talk.is_asked else scene.asked.discard)(id)
         self.agenda.set(id, person.deadline)
         self.touched.add(id)
         presence = person.presence
@@ -196,7 +207,7 @@ class People:
 def _answered_by_other(taken_up: TakenUp, asked: PersonRecognition) -> None:
     """Tell the person who was asked that somebody else has answered."""
     _, by, action, at = taken_up
-    asked.talk.take(at, lambda talk: talk.pair.other_answers(by, action, at))
+    asked.talk.other_answers(by, action, at)
 
 
 def _answered_for_all(answered: OngoingEvent, at: Seconds, asked: PersonRecognition) -> None:

@@ -1,6 +1,7 @@
 """State of robot, people and world besides the events: gazes, speakers, things on the table."""
 
 from collections import deque
+from math import inf
 from typing import NamedTuple
 
 from msgspec import Struct
@@ -53,11 +54,15 @@ class Worded(Struct, frozen=True, kw_only=True):
 
 
 class Question(NamedTuple):
-    """A question of the robot that waits. since: end of its turn. until: time by which an answer has to begin."""
+    """A question of the robot that waits. since: end of its turn. until: time by which an answer has to begin.
+
+    known_until: time from which on it is not known whether the person who was asked has answered.
+    """
 
     accept: tuple[Action, ...]
     since: Seconds
     until: Seconds
+    known_until: Seconds = inf
 
 
 class TakenUp(NamedTuple):
@@ -144,6 +149,8 @@ class SessionScene:
         """The latest speeches whose addressees are known, of all."""
         self.questions: dict[str, Question] = {}
         """Questions of the robot that wait for an answer, by the person who was asked."""
+        self.asked: set[str] = set()
+        """People who were asked, as far as is known: they may have answered already."""
         self.taken_up: list[TakenUp] = []
         """Answers to them by somebody else, which the person who was asked has yet to be told of."""
         self.unknown: dict[str, Seconds] = {}
@@ -228,7 +235,7 @@ class SessionScene:
             for asked, question in self.questions.items()
             if asked != person
             and action in question.accept
-            and after < question.since <= at
+            and after < question.since < at <= question.known_until
             and in_time(at, question.until)
         ]
         if not waiting:
@@ -237,6 +244,11 @@ class SessionScene:
         del self.questions[asked]
         self.taken_up.append(TakenUp(asked, person, action, at))
         return True
+
+    def is_contested(self, person: str, at: Seconds) -> bool:
+        """True if the robot asks somebody, and another began to speak before this, it is not known yet to whom."""
+        unknown = ((since, who) for who, since in self.unknown.items() if who != person)
+        return bool(self.asked) and any(each < (at, person) for each in unknown)
 
     def may_be_answered(self, person: str, until: Seconds) -> bool:
         """True if somebody else has begun to speak by then, of whom it is not known yet to whom it is."""

@@ -466,7 +466,7 @@ class Session:
             each.is_to_several = True
         self._speaks_to(person.id, event.block, at)
         turn_end = self._ended_turns.get(event.turn) if event.turn else self.blocks.ended.get(event.block)
-        person.talk.take(at, lambda talk: talk.robot_asks(event))
+        person.talk.robot_asks(event)
         if turn_end is None:
             self._opens(event.turn, event.responder)
         else:

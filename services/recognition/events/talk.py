@@ -21,7 +21,8 @@ from engage_hri.services.recognition.events.addressing import (
     likely,
 )
 from engage_hri.services.recognition.events.conversation import Conversation
-from engage_hri.services.recognition.events.machine import EventWriter
+from engage_hri.services.recognition.events.limits import ROUNDING
+from engage_hri.services.recognition.events.machine import EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import Question, SessionScene
 
 LONGEST_UNKNOWN: Seconds = 3.0
@@ -44,6 +45,8 @@ class Talk:
         self._conversation = Conversation(id, scene, config, writer, robot_speaks=scene.robot_speaks_to(id))
         self._line: deque[tuple[Seconds, Step | OwnSpeech]] = deque()
         """What is not told yet, with its times. The first is a speech of which it is not known to whom it is."""
+        self._is_asked_in_line = False
+        """True if a first turn of the robot is in line."""
         self._speech: OwnSpeech | None = None
         """The speech of the person that goes on."""
 
@@ -69,8 +72,14 @@ class Talk:
 
     @property
     def question(self) -> Question | None:
-        """The robot's question that waits for the person's answer; None: none does, or that is not known yet."""
-        return None if self._line else self._conversation.pair.question
+        """The robot's question that waits for the person's answer, as far as is known; None: none does."""
+        question = self._conversation.pair.question
+        return question._replace(known_until=self._line[0][0]) if question is not None and self._line else question
+
+    @property
+    def is_asked(self) -> bool:
+        """True if the robot asks the person, or waits for an answer, as far as is known."""
+        return self._is_asked_in_line or self._conversation.pair.may_be_answered
 
     @property
     def is_under_way(self) -> bool:
@@ -88,15 +97,16 @@ class Talk:
     def timed_steps(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:
         """Steps that are due by themselves, with their times."""
         if self._line:
-            yield self._decided_at, self._go_on
+            yield self._decided_at, self.go_on
         else:
             yield from self._conversation.timed_steps
 
     @property
     def _decided_at(self) -> Seconds | None:
-        """Time at which it is decided to whom the first speech in line is."""
+        """Time at which it is decided to whom the first speech in line is; None: that is known, and it waits."""
         _, speech = self._line[0]
-        assert isinstance(speech, OwnSpeech)
+        if not isinstance(speech, OwnSpeech) or speech.to is not None:
+            return None
         longest = speech.since + (LONGEST_UNTOLD if self._scene.tells_addressees else LONGEST_UNKNOWN)
         if speech.until is None:
             return longest
@@ -128,7 +138,7 @@ class Talk:
         speech.until = at
         speech.faces.turns("", at)
         self.take(at, lambda talk: talk.falls_silent(at) if speech.is_to(self._scene.robot) else None)
-        self._go_on(at)
+        self.go_on(at)
 
     def shows(self, at: Seconds, face: str, step: Step) -> None:
         """Take a sign without words, which is to the robot unless the person looks at somebody else's face.
@@ -156,7 +166,7 @@ class Talk:
                 speech.words, speech.told = words or speech.words, told or speech.told
                 self._find(speech, "", at)
         self.take(at, lambda talk: talk.understand(since, at))
-        self._go_on(at)
+        self.go_on(at)
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         """Take the person's leaving: nothing waits any longer."""
@@ -165,8 +175,8 @@ class Talk:
         self._speech = None
         for speech in self._unknown:
             self._likely(speech, at)
-        self._go_on(at)
-        self._conversation.person_gone(at, until)
+        self.go_on(at)
+        self._take_in_order(at, lambda talk: talk.person_gone(at, until))
 
     def person_back(self) -> None:
         """Take the person's return: the robot may be speaking, or may have fallen silent meanwhile."""
@@ -184,6 +194,28 @@ class Talk:
         else:
             step(self._conversation)
 
+    def robot_asks(self, event: OngoingEvent) -> None:
+        """Take the robot's first turn."""
+        self._take_in_order(event.started, lambda talk: talk.robot_asks(event))
+        self._is_asked_in_line = bool(self._line)
+
+    def _take_in_order(self, at: Seconds, step: Step) -> None:
+        """Take what ends a question of the robot, after what somebody else may have answered before."""
+        if self.is_asked and self._waits_for_others(at):
+            self._line.append((at, step))
+            self._note_unknown()
+        else:
+            self.take(at, step)
+
+    def other_answers(self, person: str, action: Action, at: Seconds) -> None:
+        """Take the answer of somebody else. It comes before all that is in line."""
+        self._catch_up(at)
+        self._conversation.pair.other_answers(person, action, at)
+
+    def _waits_for_others(self, at: Seconds) -> bool:
+        """True if somebody else may have answered the robot before `at`."""
+        return self._scene.is_contested(self.id, at)
+
     @property
     def _unknown(self) -> list[OwnSpeech]:
         return [each for _, each in self._line if isinstance(each, OwnSpeech) and each.to is None]
@@ -193,6 +225,7 @@ class Talk:
         if self._line:
             self._scene.unknown[self.id] = self._line[0][0]
         else:
+            self._is_asked_in_line = False
             self._scene.unknown.pop(self.id, None)
 
     def _find(self, speech: OwnSpeech, face: str, at: Seconds) -> bool:
@@ -213,7 +246,8 @@ class Talk:
         self._scene.note_spoken(speech)
 
     def _queue(self, at: Seconds, speech: OwnSpeech) -> None:
-        if self._line or speech.to is None:
+        is_next = speech.is_to(self._scene.robot) and self._waits_for_others(at)
+        if self._line or speech.to is None or is_next:
             self._line.append((at, speech))
             self._note_unknown()
         elif speech.is_to(self._scene.robot):
@@ -225,7 +259,7 @@ class Talk:
             speech.faces.turns(speech.faces.face, at)
         self._address(speech, likely(speech, self._scene.spoken), at)
 
-    def _go_on(self, now: Seconds) -> None:
+    def go_on(self, now: Seconds) -> None:
         """Tell all in line up to the next speech of which it is not known to whom it is."""
         while self._line:
             at, item = self._line[0]
@@ -233,6 +267,8 @@ class Talk:
                 if self._decided_at is None or self._decided_at > now:
                     break
                 self._likely(item, now)
+            if self._waits_for_others(at):
+                break
             self._line.popleft()
             self._catch_up(at)
             if not isinstance(item, OwnSpeech):
@@ -243,5 +279,6 @@ class Talk:
 
     def _catch_up(self, until: Seconds) -> None:
         """Take the steps of the conversation that were due before `until`."""
-        while (due := min((at for at in self._conversation.deadlines if at is not None), default=until)) < until:
+        last = until - ROUNDING
+        while (due := min((at for at in self._conversation.deadlines if at is not None), default=until)) < last:
             next(step for at, step in self._conversation.timed_steps if at == due)(due)

@@ -1,0 +1,314 @@
+"""A coder who sees a whole timeline, and writes down the events with the robot by their definitions.
+
+Takes nothing from the code that it judges. Definitions: thesis 2.2; limits and what people mean by overlapping signs:
+docs/recognition.md.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from msgspec import Struct
+from msgspec.structs import astuple
+
+from engage_hri.schemas.recognition import ConnectionEvent
+from tests.recognition.observations import ROBOT
+from tests.recognition.timeline import LIMIT, LISTENING, Absence, Drawing, Instant, Span, Timeline, Turn
+
+BRIEF = 0.8
+"""Longest speech of a listener whose words nobody tells."""
+WORDS_WAIT = 1.5
+THIRD_TURN = 1.5
+FACE_GRACE = 2.0
+ROUND = 1e-6
+BEFORE = (-1.0, 0)
+LAST = 10**9
+"""After all else that happens at a time."""
+
+
+class Coded(Struct, frozen=True, order=True):
+    """An event as both the coder and recognition have it. delay: None: none. late: of an answer after the limit."""
+
+    kind: str
+    initiator: str
+    responder: str
+    started: float
+    state: str
+    delay: float | None = None
+    answered_by: str = ""
+    late: float | None = None
+
+
+class Side:
+    """One person and the robot, as far as the coder has read."""
+
+    def __init__(self, person: str) -> None:
+        self.person = person
+        self.own: list[Span] = []
+        """The person's speeches that wait for the robot's answer: one turn."""
+        self.asked: Turn | None = None
+        """The robot's turn that waits for the person's answer."""
+        self.unanswered: Turn | None = None
+        """The robot's last turn, if nobody has answered it in time."""
+        self.cut_into: Span | None = None
+        """The person's words into which the robot has begun its answer."""
+        self.third_until = -1.0
+        self.answers_until = BEFORE
+        """End of the person's last answer: what begins before it is part of it."""
+
+
+class Coder:
+    """Reads a timeline from beginning to end; of each sign it knows all that is still to come."""
+
+    def __init__(self, timeline: Timeline, limit: float = LIMIT) -> None:
+        self._timeline, self._limit = timeline, limit
+        self._sides = {person: Side(person) for person in timeline.people}
+        self._events: dict[tuple[str, str, str, float], Coded] = {}
+        self._used: set[int] = set()
+        """Signs that have been read within a turn of the robot, by `id`."""
+        self._turns: set[int] = set()
+        """Those that turned out to be turns of the person, to be read when they come."""
+        self._gone = [each for each in timeline.away if each.until[0] - each.since[0] >= FACE_GRACE]
+
+    def events(self) -> list[Coded]:
+        """Adjacency pairs and backchannels, each as it was decided."""
+        signs = [each for each in self._timeline.spans if each.to == ROBOT and each.action != "look"]
+        acts: list[Span | Turn | Absence] = [*signs, *self._timeline.turns, *self._gone]
+        for act in sorted(acts, key=_known):
+            for side in self._sides.values():
+                self._expire(side, _known(act)[0])
+            if isinstance(act, Turn):
+                self._robot(self._sides[act.to], act)
+            elif isinstance(act, Absence):
+                self._leaves(self._sides[act.who], act)
+            elif id(act) in self._turns:
+                self._takes_turn(self._sides[act.who], act)
+            elif id(act) not in self._used:
+                self._person(self._sides[act.who], act)
+        for side in self._sides.values():
+            self._expire(side, 1e6)
+        return sorted(self._events.values())
+
+    def _note(self, kind: str, initiator: str, responder: str, at: float, state: str, **more: Any) -> None:
+        self._events[kind, initiator, responder, at] = Coded(kind, initiator, responder, at, state, **more)
+
+    def _pair_of(self, turn: Turn, state: str, **more: Any) -> None:
+        self._note("adjacency_pair", ROBOT, turn.to, turn.since[0], state, **more)
+
+    def _own_pair(self, side: Side, state: str, **more: Any) -> None:
+        self._note("adjacency_pair", side.person, ROBOT, side.own[0].since[0], state, **more)
+        side.own = []
+
+    # -- what ends by itself --------------------------------------------------------------------------------------
+
+    def _expire(self, side: Side, now: float) -> None:
+        """Let the limits pass that are over before `now`."""
+        if side.asked is not None and side.asked.until[0] + self._limit + ROUND < now:
+            self._pair_of(side.asked, "failed")
+            side.asked, side.unanswered = None, side.asked
+        if side.own and side.own[-1].until[0] + self._limit + ROUND < now:
+            self._own_pair(side, "failed")
+
+    def _leaves(self, side: Side, absence: Absence) -> None:
+        if side.asked is not None:
+            self._pair_of(side.asked, "failed")
+        if side.own:
+            self._own_pair(side, "withdrawn")
+        side.asked = side.unanswered = None
+
+    # -- the robot ------------------------------------------------------------------------------------------------
+
+    def _robot(self, side: Side, turn: Turn) -> None:
+        """Read a turn of the robot: it answers who waits, or still speaks; and what is said and shown into it."""
+        was_waiting = bool(side.own)
+        was_over = was_waiting and side.own[-1].until < turn.since
+        if was_waiting:
+            side.cut_into = None if was_over else side.own[-1]
+            self._own_pair(side, "succeeded", delay=turn.since[0] - side.own[-1].until[0])
+            # An answer that asks is over, as an answer, when the question begins.
+            end = turn.until if turn.kind == "replies" else turn.since if was_over else BEFORE
+            side.third_until = end[0] + THIRD_TURN
+        elif side.cut_into is not None and turn.since < side.cut_into.until:
+            if turn.kind == "replies":  # it goes on with its answer
+                side.third_until = turn.until[0] + THIRD_TURN
+        elif turn.kind == "replies" and self._is_listening(side, turn):
+            self._note("backchannel", side.person, ROBOT, turn.since[0], "completed")
+        if turn.kind == "asks" and side.asked is not None:
+            self._pair_of(side.asked, "superseded")
+            side.asked = None
+        side.unanswered = None
+        answers = self._listens(side, turn)
+        answer = answers[0] if answers else None
+        if turn.kind != "asks":
+            # What interrupts an answer is of the same exchange; what goes on after it is the third turn.
+            kept = [each for each in answers if not (was_waiting and self._is_decided(each, turn))]
+            self._turns |= {id(each) for each in kept}
+        elif answer is not None:
+            self._pair_of(turn, "succeeded", delay=answer.since[0] - turn.until[0])
+            side.answers_until, side.third_until = answer.until, -1.0
+        elif turn.is_aborted:
+            self._pair_of(turn, "withdrawn")
+        else:
+            side.asked = turn
+
+    def _listens(self, side: Side, turn: Turn) -> list[Span]:
+        """Read what a person does in the robot's turn. Returns what takes the floor."""
+        signs = [
+            each for each in self._timeline.spans
+            if each.who == side.person and each.to == ROBOT and each.action != "look"
+            and turn.since < each.since < turn.until
+        ]  # fmt: skip
+        self._used |= {id(each) for each in signs}
+        every, signs = signs, [each for each in signs if not self._goes_with_words(each, turn)]
+        found: list[Span] = []
+        sets = [*self._together(signs)]
+        may_be_answered = turn.kind == "asks" or side.asked is not None
+        for number, sign in enumerate(sets):
+            goes_on = [
+                each for each in sign if each.until > turn.until and (each.action == "speak" or may_be_answered)
+            ]  # fmt: skip
+            interrupts = [each for each in sign if each.action == "speak" and self._interrupts(each, turn)]
+            answers = sorted([*goes_on, *interrupts], key=lambda each: each.since)
+            following = sets[number + 1][0].since if number + 1 < len(sets) else turn.until
+            over = max(each.until for each in every if sign[0].since <= each.since <= sign[-1].until)
+            late = [each for each in interrupts if self._is_told_late(each, turn, following)]
+            is_brief = any(over < each.known for each in late if each.known is not None) and not goes_on
+            if any(each.action == "speak" for each in answers) or (answers and not found):
+                found.append(answers[0])
+                is_listening = is_brief
+            else:
+                is_decided = bool(found) and any(each.seconds > WORDS_WAIT + ROUND for each in sign)
+                is_listening = any(each.action != "point" for each in sign) and not is_decided
+            if is_listening:
+                self._note("backchannel", ROBOT, side.person, sign[0].since[0], "completed")
+        return found
+
+    def _is_listening(self, side: Side, turn: Turn) -> bool:
+        """True if the robot says a little while the person speaks, and has nothing to answer."""
+        speech = [each for each in self._timeline.spans if each.who == side.person and each.action == "speak"]
+        beside = any(each.to == ROBOT and each.since < turn.since and turn.until < each.until for each in speech)
+        return beside and turn.until[0] - turn.since[0] <= BRIEF + ROUND
+
+    def _is_told_late(self, speech: Span, turn: Turn, following: Instant) -> bool:
+        """True if a speech counts as a listener's when its words come, so that it has been told as one.
+
+        following: when the next sign begins.
+        """
+        if turn.kind != "asks" or speech.known is None or speech.seconds > WORDS_WAIT + ROUND:
+            return False
+        return following < speech.known or speech.known[0] > speech.since[0] + WORDS_WAIT + ROUND
+
+    def _goes_with_words(self, sign: Span, turn: Turn) -> bool:
+        """True for a gesture beside the person's own words, if these are no listener's: it says nothing more."""
+        beside = self._words_beside(sign)
+        own = [each for each in beside if each.since < turn.since or self._interrupts(each, turn)]
+        return sign.action != "speak" and bool(own)
+
+    def _words_beside(self, sign: Span) -> list[Span]:
+        """What the person says to the robot when the sign begins."""
+        return [
+            each for each in self._timeline.spans
+            if each.who == sign.who and each.action == "speak" and each.to == ROBOT
+            and each.since < sign.since < each.until
+        ]  # fmt: skip
+
+    def _together(self, signs: Sequence[Span]) -> Iterator[list[Span]]:
+        """What is done at the same time is one sign."""
+        found: list[Span] = []
+        for each in sorted(signs, key=lambda each: each.since):
+            if found and max(one.until for one in found) < each.since:
+                yield found
+                found = []
+            found.append(each)
+        if found:
+            yield found
+
+    def _is_decided(self, answer: Span, turn: Turn) -> bool:
+        """True if it is known before the end of the robot's words that somebody has interrupted them."""
+        return answer.action == "speak" and min(answer.until[0], answer.since[0] + BRIEF) < turn.until[0] - ROUND
+
+    def _interrupts(self, speech: Span, turn: Turn) -> bool:
+        """True if a speech that is over within the robot's turn takes the floor."""
+        if speech.known is not None and speech.known < turn.until and turn.kind == "asks":
+            return speech.words not in LISTENING
+        return speech.seconds > (WORDS_WAIT if self._timeline.is_worded and turn.kind == "asks" else BRIEF) + ROUND
+
+    # -- the person -----------------------------------------------------------------------------------------------
+
+    def _person(self, side: Side, sign: Span) -> None:
+        """Read a sign outside the robot's turns to this person."""
+        goes_with_words = sign.action != "speak" and self._words_beside(sign)
+        if sign.since >= side.answers_until and not goes_with_words:
+            self._takes_turn(side, sign)
+
+    def _takes_turn(self, side: Side, sign: Span) -> None:
+        """Read an answer, or words of the person's own."""
+        at = sign.since[0]
+        if side.asked is not None:
+            self._pair_of(side.asked, "succeeded", delay=at - side.asked.until[0])
+            side.asked, side.answers_until, side.third_until = None, sign.until, -1.0
+        elif sign.action == "speak" and (asked := self._asked_of_another(side, sign)) is not None:
+            turn = asked.asked
+            assert turn is not None
+            self._pair_of(turn, "preempted", delay=at - turn.until[0], answered_by=side.person)
+            asked.asked = side.unanswered = None
+        elif side.unanswered is not None:
+            turn, side.unanswered = side.unanswered, None
+            self._pair_of(turn, "failed", late=at - turn.until[0])
+            side.answers_until = sign.until
+        elif sign.action == "speak":
+            if not side.own and at <= side.third_until + ROUND:
+                side.third_until = -1.0
+            else:
+                side.own.append(sign)
+
+    def _asked_of_another(self, side: Side, sign: Span) -> Side | None:
+        """Whom the robot has asked, and who has not answered yet when somebody else says this."""
+        asked = [each for each in self._sides.values() if each is not side and each.asked is not None]
+        last = (side.own[-1].until if side.own else BEFORE)[0]
+        at = sign.since[0]
+        waiting = [each for each in asked if last < each.asked.until[0] < at]
+        return max(waiting, key=lambda each: each.asked.until, default=None)
+
+
+def _known(act: Span | Turn | Absence) -> Instant:
+    """When it is taken into account: a face that is back soon had not gone."""
+    return (act.since[0] + FACE_GRACE, LAST) if isinstance(act, Absence) else act.since
+
+
+def as_told(events: Sequence[ConnectionEvent]) -> list[Coded]:
+    """What recognition has told, as the coder writes it."""
+    lives: dict[str, Coded] = {}
+    for each in events:
+        before = lives.get(each.id)
+        if each.kind not in ("adjacency_pair", "backchannel"):
+            continue
+        state = "completed" if each.kind == "backchannel" else each.state
+        is_late = each.retold and each.state == "failed"
+        if before is not None and before.state != "started" and not is_late:
+            continue
+        late = each.delay if is_late else None
+        delay = each.delay if state in ("succeeded", "preempted") else None
+        lives[each.id] = Coded(
+            each.kind, each.initiator, each.responder, each.started.seconds, state, delay, each.answered_by, late
+        )
+    return sorted(lives.values())
+
+
+def rounded(events: Sequence[Coded]) -> list[Coded]:
+    """The same, with times to ten microseconds."""
+    return [
+        Coded(*(round(value, 5) if isinstance(value, float) else value for value in astuple(each))) for each in events
+    ]
+
+
+def differences(seed: int) -> tuple[int, list[str]]:
+    """Number of events of a drawn timeline, and what only one of recognition and the coder has."""
+    timeline = Drawing(seed).timeline
+    told, coded = rounded(as_told(timeline.told())), rounded(Coder(timeline).events())
+    return only_one_has(told, coded)
+
+
+def only_one_has(told: Sequence[object], coded: Sequence[object]) -> tuple[int, list[str]]:
+    """Number of events that are coded, and those that differ."""
+    only = [f"told  {each}" for each in told if each not in coded]
+    return len(coded), only + [f"coded {each}" for each in coded if each not in told]

@@ -1,0 +1,270 @@
+"""Looks of one person and the robot, drawn at random, and the gaze events that a coder of the whole writes down.
+
+Takes nothing from the code that it judges. Definitions: thesis 2.2.1 and 2.2.2, limits: docs/recognition.md. Where
+the thesis leaves it open, the coder has it as that page: a look directs when it has lasted, and a glance of the robot
+that is over by then is no answer.
+"""
+
+import random
+from typing import NamedTuple
+
+from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.recognition import ConnectionEvent
+from tests.recognition.coder import only_one_has
+from tests.recognition.observations import HUMAN, ROBOT, Log
+
+OBJECTS = ("blue-square", "rectangle")
+FACE = {HUMAN: ROBOT, ROBOT: HUMAN}
+FACIAL_LIMIT, DIRECTED_LIMIT = 1.9, 2.5
+DIRECTS_AFTER = 0.6
+AFTER_ROBOT = 2.0
+ROUND = 1e-6
+NEVER = float("inf")
+
+
+class Look(NamedTuple):
+    since: float
+    until: float
+    target: str
+
+
+class Request(NamedTuple):
+    at: float
+    kind: EventKind
+    target: str
+
+
+class Gazed(NamedTuple):
+    """An event. objects: none for a mutual gaze."""
+
+    kind: str
+    initiator: str
+    started: float
+    target: str
+    state: str
+    delay: float | None = None
+
+
+class Gazes:
+    """A timeline of looks. All begin at different times, but for those that begin with a limit."""
+
+    def __init__(self, seed: int) -> None:
+        self._chance = random.Random(seed)
+        self.looks = {who: self._drawn(who) for who in (HUMAN, ROBOT)}
+        self.requests = [
+            Request(round(at + 0.003, 3), "mutual_facial_gaze" if target == HUMAN else "directed_gaze", target)
+            for at, _, target in self.looks[ROBOT] if target and self._chance.random() < 0.4
+        ]  # fmt: skip
+        late = [each for each in self.requests if self._chance.random() < 0.3]
+        self.requests = [
+            each._replace(at=round(each.at + self._chance.uniform(-1.0, 1.0), 3) + 0.0004) if each in late else each
+            for each in self.requests
+        ]
+        self.requests = sorted(each for each in self.requests if each.at > 0)
+
+    def _drawn(self, who: str) -> list[Look]:
+        chance, at, found = self._chance, 0.5 if who == HUMAN else 0.7, list[Look]()
+        grid = 0.1 if chance.random() < 0.5 else 0.001
+        for _ in range(30):
+            lasts = max(0.2, round(chance.choice((chance.uniform(0.2, 1.5), chance.uniform(0.5, 6.0))) / grid) * grid)
+            target = chance.choice((FACE[who], FACE[who], *OBJECTS, "table"))
+            until = round(at + lasts, 6)
+            if not found or found[-1].target != target:
+                found.append(Look(at, until, target))
+            else:
+                found[-1] = found[-1]._replace(until=until)
+            at = until
+        return [*found[:-1], found[-1]._replace(until=NEVER)]
+
+    def told(self) -> list[Gazed]:
+        log = Log()
+        steps = [(look.since, 0, who, look) for who, looks in self.looks.items() for look in looks]
+        asked = [(each.at, 1, ROBOT, each) for each in self.requests]
+        for at, _, who, what in sorted([*steps, *asked], key=lambda each: each[:3]):
+            while (due := log.session.deadline) is not None and due < at - ROUND:
+                log.until(due)
+            if isinstance(what, Look):
+                log.looks(who, what.target, at)
+            else:
+                objects = (what.target,) if what.kind == "directed_gaze" else ()
+                log.requests_event(what.kind, at, *objects, block=f"b{at}")
+        log.until(1e4)
+        return as_told(log.events)
+
+
+def as_told(events: list[ConnectionEvent]) -> list[Gazed]:
+    """How each event was decided."""
+    found: dict[str, Gazed] = {}
+    for each in events:
+        if each.id not in found and each.state != "started":
+            delay = round(each.delay, 5) if each.state == "succeeded" and each.delay is not None else None
+            target = each.objects[0] if each.objects else ""
+            found[each.id] = Gazed(
+                each.kind, each.initiator, round(each.started.seconds, 5), target, each.state, delay
+            )
+    return sorted(found.values())
+
+
+class GazeCoder:
+    """Reads looks and requests from beginning to end."""
+
+    def __init__(self, gazes: Gazes) -> None:
+        self._human, self._robot = gazes.looks[HUMAN], gazes.looks[ROBOT]
+        self._requests = gazes.requests
+        self._found: list[Gazed] = []
+        self._answers: set[float] = set()
+        """When looks have answered the robot's."""
+        self._directed: list[tuple[float, float, str, str]] = []
+        """Directed gazes: when each was recognized and over, who began it, and its object."""
+
+    def events(self) -> list[Gazed]:
+        self._directed_gazes()
+        self._mutual_gazes()
+        return sorted(self._found)
+
+    def _note(
+        self, kind: str, initiator: str, at: float, target: str, state: str, delay: float | None = None
+    ) -> None:
+        delay = None if delay is None else round(delay, 5)
+        self._found.append(Gazed(kind, initiator, round(at, 5), target, state, delay))
+
+    @staticmethod
+    def _on(looks: list[Look], target: str, at: float) -> Look | None:
+        """The look at the target that goes on at a time.
+
+        Of the robot's also one that ends just then: of what happens at one time the person's is observed first.
+        """
+        found = [each for each in looks if each.target == target and each.since <= at <= each.until]
+        return next((each for each in found if at < each.until or target == HUMAN), None)
+
+    @staticmethod
+    def _comes(looks: list[Look], target: str, after: float) -> float:
+        return min((each.since for each in looks if each.target == target and each.since > after), default=NEVER)
+
+    # -- directed gaze ------------------------------------------------------------------------------------------
+
+    def _directed_gazes(self) -> None:
+        begins: list[tuple[float, Look | Request]] = [
+            (each.since + DIRECTS_AFTER, each) for each in self._human
+            if each.target in OBJECTS and each.until > each.since + DIRECTS_AFTER + ROUND
+        ]  # fmt: skip
+        begins += [(each.at, each) for each in self._requests if each.kind == "directed_gaze"]
+        for at, what in sorted(begins, key=lambda each: (round(each[0], 6), isinstance(each[1], Look))):
+            if isinstance(what, Request):
+                self._robot_directs(what)
+            elif not self._is_answer(what, at):
+                self._human_directs(what, at)
+
+    def _is_answer(self, look: Look, at: float) -> bool:
+        """True for a look that follows the robot's direction, or goes on with what both are about already."""
+        for known, over, who, target in self._directed:
+            if target != look.target or known > at:
+                continue
+            if over > at or (who == ROBOT and look.since <= over + AFTER_ROBOT + ROUND and look.until > known):
+                return True
+        return False
+
+    def _next_request(self, target: str, after: float) -> float:
+        asked = (each.at for each in self._requests if each.kind == "directed_gaze" and each.target == target)
+        return min((at for at in asked if at > after), default=NEVER)
+
+    def _human_directs(self, look: Look, known: float) -> None:
+        limit, asks = look.since + DIRECTED_LIMIT, self._next_request(look.target, known)
+        there = self._on(self._robot, look.target, known)
+        comes = max(there.since, look.since) if there is not None else self._comes(self._robot, look.target, known)
+        over = min(limit, asks)
+        if there is not None or (comes <= limit + ROUND and comes < asks):
+            self._note("directed_gaze", HUMAN, look.since, look.target, "succeeded", comes - look.since)
+            over = self._part(look.target, max(comes, known), asks)
+        else:
+            state = "failed" if limit < asks else "superseded"
+            self._note("directed_gaze", HUMAN, look.since, look.target, state)
+        self._directed.append((known, over, HUMAN, look.target))
+
+    def _robot_directs(self, asked: Request) -> None:
+        at, target = asked.at, asked.target
+        limit, asks = at + DIRECTED_LIMIT, self._next_request(target, at)
+        comes = at if self._on(self._human, target, at) else self._comes(self._human, target, at)
+        over = min(limit, asks)
+        if comes <= limit + ROUND and comes < asks:
+            self._note("directed_gaze", ROBOT, at, target, "succeeded", comes - at)
+            over = self._part(target, comes, asks, begun=at)
+        else:
+            self._note("directed_gaze", ROBOT, at, target, "failed" if limit < asks else "superseded")
+        self._directed.append((at, over, ROBOT, target))
+
+    def _part(self, target: str, at: float, asks: float, begun: float | None = None) -> float:
+        """When the shared phase is over. begun: the robot's request, if it began; its gaze may follow."""
+        human, robot = self._on(self._human, target, at), self._on(self._robot, target, at)
+        if human is None:
+            return at
+        if robot is not None:
+            return min(human.until, robot.until, asks)
+        had_come = begun is not None and any(
+            each.target == target and each.until > begun and each.since <= at for each in self._robot
+        )
+        if begun is None or had_come:
+            return at
+        comes = self._comes(self._robot, target, at)
+        if comes >= min(human.until, asks):
+            return min(human.until, asks)
+        there = self._on(self._robot, target, comes)
+        return min(human.until, asks, NEVER if there is None else there.until)
+
+    # -- mutual facial gaze -------------------------------------------------------------------------------------
+
+    def _mutual_gazes(self) -> None:
+        looks = [(each.since, HUMAN, each.until) for each in self._human if each.target == ROBOT]
+        asked = [(each.at, ROBOT, NEVER) for each in self._requests if each.kind == "mutual_facial_gaze"]
+        over = -1.0
+        for at, who, until in sorted([*looks, *asked]):
+            asks = min((each[0] for each in asked if each[0] > at), default=NEVER)
+            if who == ROBOT:
+                over = self._robot_looks(at, asks)
+            elif over <= at and at not in self._answers:
+                over = self._human_looks(at, until, asks)
+
+    def _human_looks(self, at: float, until: float, asks: float) -> float:
+        limit = at + FACIAL_LIMIT
+        comes = at if self._on(self._robot, HUMAN, at) else self._comes(self._robot, HUMAN, at)
+        first = min(limit, until, asks)
+        if comes <= limit + ROUND and comes < min(until, asks):
+            self._note("mutual_facial_gaze", HUMAN, at, "", "succeeded", comes - at)
+            return self._mutual_until(comes, asks)
+        self._note("mutual_facial_gaze", HUMAN, at, "", "superseded" if first == asks else "failed")
+        return first
+
+    def _robot_looks(self, at: float, asks: float) -> float:
+        limit = at + FACIAL_LIMIT
+        comes = at if self._on(self._human, ROBOT, at) else self._comes(self._human, ROBOT, at)
+        there = self._on(self._robot, HUMAN, at) or self._on(self._robot, HUMAN, self._comes(self._robot, HUMAN, at))
+        leaves = NEVER if there is None else there.until
+        directs = self._directs(at, by=ROBOT)
+        if comes <= limit + ROUND and comes < min(asks, directs) and comes <= leaves:
+            self._note("mutual_facial_gaze", ROBOT, at, "", "succeeded", comes - at)
+            self._answers.add(comes)
+            return self._mutual_until(comes, asks, begun=at)
+        first = min(limit, leaves, asks, directs)
+        state = "superseded" if first == asks else "failed" if first == limit else "withdrawn"
+        self._note("mutual_facial_gaze", ROBOT, at, "", state)
+        return first
+
+    def _directs(self, after: float, by: str = "") -> float:
+        """When the next directed gaze is recognized."""
+        return min((known for known, _, who, _ in self._directed if known > after and by in ("", who)), default=NEVER)
+
+    def _mutual_until(self, at: float, asks: float, begun: float | None = None) -> float:
+        human, robot = self._on(self._human, ROBOT, at), self._on(self._robot, HUMAN, at)
+        ends = min(asks, self._directs(at), NEVER if human is None else human.until)
+        if robot is None and begun is not None:  # its gaze may still come
+            robot = self._on(self._robot, HUMAN, self._comes(self._robot, HUMAN, at))
+            if robot is None or robot.since >= ends:
+                return ends
+        return min(ends, NEVER if robot is None else robot.until)
+
+
+def differences(seed: int) -> tuple[int, list[str]]:
+    """Number of events of a drawn timeline, and what only one of recognition and the coder has."""
+    gazes = Gazes(seed)
+    told, coded = gazes.told(), GazeCoder(gazes).events()
+    return only_one_has(told, coded)
