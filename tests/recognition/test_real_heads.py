@@ -7,6 +7,7 @@ line from the head to the camera. Reduced to five a second from the test recordi
 
 import csv
 import math
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from engage_hri.schemas.perception import HeadPose
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.perceive.attending import Attending
 from engage_hri.services.recognition.perceive.gaze_targets import ROBOT_FACE
 from engage_hri.services.recognition.recognizer import Recognizer
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
@@ -53,7 +55,7 @@ def estimates(name: str) -> dict[str, list[float]]:
     last: dict[str, float] = {}
     told: dict[str, list[float]] = {}
 
-    def take(results: list[object], now: float) -> None:
+    def take(results: Sequence[object], now: float) -> None:
         changes = [each for each in results if isinstance(each, ConnectionEvent)]
         published.feed(changes, set(), now, recognizer.contacts())
         for each in published.told(now):
@@ -75,6 +77,17 @@ def estimates(name: str) -> dict[str, list[float]]:
     return told
 
 
+@cache
+def attention(name: str, *, learned: bool) -> dict[str, float]:
+    """How much each head of a recording attends to the robot, in the mean."""
+    heads: dict[str, Attending] = {}
+    told: dict[str, list[float]] = {}
+    for at, person, _, angle in recordings()[name]:
+        head = heads.setdefault(person, Attending())
+        told.setdefault(person, []).append(head.judge((0.0, angle), at, is_free=learned))
+    return {person: sum(course) / len(course) for person, course in told.items()}
+
+
 def ranked(above: list[float], below: list[float]) -> float:
     """Share of the pairs of which the first is above the second: the area under the ROC curve."""
     pairs = [(one, other) for one in above for other in below]
@@ -94,3 +107,16 @@ def test_the_estimate_ranks_engaged_people_above_disengaged_ones(of: str) -> Non
 
 def test_who_attends_to_the_robot_for_all_of_the_time_is_engaged() -> None:
     assert min(estimates("engaged_1")["p1"][20:]) > 0.5
+
+
+@pytest.mark.parametrize("name", recordings())
+def test_what_is_learned_of_a_head_is_for_the_good_of_the_engaged(name: str) -> None:
+    """Where a head points that attends is learned from the engaged; of the others there is nothing to learn."""
+    before, after = attention(name, learned=False), attention(name, learned=True)
+    gains = [after[person] - before[person] for person in before]
+
+    if "disengaged" in name:
+        assert gains == pytest.approx([0.0] * len(gains), abs=0.02)
+    else:
+        assert max(gains) > 0.03
+        assert min(gains) >= 0.0

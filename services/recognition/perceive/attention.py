@@ -8,41 +8,30 @@ A symbolic report of an action has precedence: from the first one on, raw percep
 ignored, as long as the `Attention` lives. Actions carry the times at which they began and ended, though they are
 known only later; until then `undecided` says from when on.
 
-How much a head attends to the robot is a matter of degree. Heads of people who attend to a robot point some twenty
-degrees beside its camera: they look at its middle, at what it holds, or with the eyes alone (recordings of ROS4HRI's
-hri_engagement, where a cone of 20 degrees tells the engaged from the disengaged, and one of 10 finds neither).
+How much a head attends to the robot is a matter of degree, and of the person: see `attending.py`.
 """
 
-import math
 from collections.abc import Iterable, Iterator
 from itertools import chain
 
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.body import Ray, RobotState
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose, VoiceActivity
-from engage_hri.schemas.units import Degrees, Probability, Seconds, Stamp
+from engage_hri.schemas.units import Probability, Seconds, Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import Absent
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.interrupted_looks import Symbolic
 from engage_hri.services.recognition.events.presence import NEVER
 from engage_hri.services.recognition.events.scene import Covered
-from engage_hri.services.recognition.perceive.gaze_targets import GazeTargets, is_direction, is_place
+from engage_hri.services.recognition.perceive.attending import Attending
+from engage_hri.services.recognition.perceive.gaze_targets import AWAY, GazeTargets, is_direction, is_place
 from engage_hri.services.recognition.perceive.looks import ROUNDING, Change, Looking
 from engage_hri.services.recognition.perceive.manipulation import Manipulation, PersonChanges
 from engage_hri.services.recognition.perceive.speech import SpeechDetector
 from engage_hri.services.reports.action_reports import FACE_GRACE
 
-FULL_ATTENTION: Degrees = 20.0
-"""Angle between a head and the line to the robot's face up to which the head attends to it, by these recordings."""
-NO_ATTENTION: Degrees = 30.0
-"""Angle from which on it does not."""
 Raw = HeadPose | VoiceActivity | World | RobotState
-
-
-def attention(angle: Degrees) -> Probability:
-    """Attention of a head to the robot, 0 to 1. angle: between its direction and the line to the robot's face."""
-    return max(0.0, min(1.0, (NO_ATTENTION - angle) / (NO_ATTENTION - FULL_ATTENTION)))
 
 
 class _Actor:
@@ -61,6 +50,7 @@ class _Actor:
         self.reported: set[Action] = set()
         """Actions that perception reports itself."""
         self.presence_reported = False
+        self.attending = Attending()
         self.to_robot: Probability | None = None
         """How much the head attends to the robot; None: it is not seen, or perception reports looks itself."""
 
@@ -235,8 +225,10 @@ class Attention:
         if "look" in actor.reported:
             return actions
         gaze, present = (pose.position, pose.direction), actor.looking.nearest
-        self._attends(actor, round(attention(math.degrees(self._gaze_targets.angle_to_robot(gaze))), 1))
         seen = self._gaze_targets.target(actor.id, gaze, present=present, at=at, sure=pose.confidence)
+        is_free = seen.targets in (AWAY, (self._robot,))
+        much = actor.attending.judge(self._gaze_targets.offset_of_robot(gaze), at, is_free=is_free)
+        self._attends(actor, round(much, 1))
         return actions + self._tell(actor, actor.looking.feed(seen, at))
 
     def _attends(self, actor: _Actor, much: Probability | None) -> None:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from engage_hri.schemas.units import FARTHEST, Meters, Probability, Radians, Seconds, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import GAZE_MARGIN, RecognitionConfig
+from engage_hri.services.recognition.perceive.attending import Offset
 
 FACE_RADIUS: Meters = 0.12
 """Radius of the faces of people and of the robot, around the point between the eyes: half a head. Ours."""
@@ -156,11 +157,17 @@ class GazeTargets:
         else:
             self._spheres = None
 
-    def angle_to_robot(self, gaze: tuple[Vector, Vector]) -> Radians:
-        """Angle between a gaze, the place of the eyes and a direction, and the line to the robot's face."""
+    def offset_of_robot(self, gaze: tuple[Vector, Vector]) -> Offset:
+        """Offset of the robot's face from the direction of a gaze. gaze: place of the eyes, and direction."""
         ray, face = _Gaze(*gaze), self._known[self._robot].entity.position
-        away = _minus(face, ray.eye)
-        return math.acos(max(-1.0, min(1.0, _dot(away, ray.axis) / max(math.hypot(*away), 1e-9))))
+        away, (x, y, z) = _minus(face, ray.eye), ray.axis
+        angle = math.degrees(math.acos(max(-1.0, min(1.0, _dot(away, ray.axis) / max(math.hypot(*away), 1e-9)))))
+        flat = math.hypot(x, y)
+        level = (x / flat, y / flat) if flat > 0.0 else (1.0, 0.0)
+        left = level[0] * away[1] - level[1] * away[0]
+        up = flat * away[2] - z * (level[0] * away[0] + level[1] * away[1])
+        bearing = math.atan2(up, left)
+        return angle * math.cos(bearing), angle * math.sin(bearing)
 
     def forget_face(self, actor: str) -> None:
         if self._known.pop(actor, None) is not None:
@@ -201,6 +208,7 @@ class GazeTargets:
                 angle = ray.angle_to(thing)
                 if angle <= self._half_angle + (self._margin if targets == present else 0.0):
                     distance = math.dist(thing.entity.position, ray.eye)
+                    confidence = self._sureness(confidence, angle)
                     found.append(_Candidate(round(angle / SAME_ANGLE) * SAME_ANGLE, distance, targets, confidence))
                     nearest = min(nearest, angle)
         if found:
@@ -238,6 +246,10 @@ class GazeTargets:
     def _confidence(self, thing: _Thing, at: Seconds) -> Probability:
         age = 0.0 if thing.hidden_since is None else max(0.0, at - thing.hidden_since)
         return thing.entity.confidence * math.exp2(-age / MEMORY)
+
+    def _sureness(self, seen: Probability, angle: Radians) -> Probability:
+        """Confidence that a gaze is on what is `seen` this surely, at this angle: the least at the edge."""
+        return seen - (seen - self._least) * min(1.0, angle / self._half_angle)
 
     def _reported(self, entity: Entity) -> str:
         """Id to report for the entity: at resolution `table` that of the surface on which an object lies."""
