@@ -361,8 +361,7 @@ class PersonRecognition:
 
     def waits_for(self, block: str, name: str) -> bool:
         """True if a time limit runs from this sync point of a block of the robot."""
-        clocks = [each.clock for each in self.gaze_machines() if each.event is not None and each.event.block == block]
-        return any(clock is not None and name in clock.waiting for clock in clocks)
+        return any(machine.waits_for(block, name) for machine in self.gaze_machines())
 
     def point_realised(self, block: str, name: str, at: Seconds) -> None:
         """Take a realised sync point of a block of the robot: time limits may run from there."""

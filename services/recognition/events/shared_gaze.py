@@ -171,6 +171,13 @@ class SharedGaze(Machine):
         self._robot_pointed = True
         self._follow(at)
 
+    def waits_for(self, block: str, name: str) -> bool:
+        """True if a time limit runs from this sync point of a block of the robot."""
+        if self._asked is not None and self._asked.event.block == block and name in self._asked.clock.waiting:
+            return True
+        is_own = self.event is not None and self.event.block == block
+        return is_own and self._clock is not None and name in self._clock.waiting
+
     def realised(self, block: str, name: str, at: Seconds) -> None:
         """Take a realised sync point of a block of the robot: time limits may run from there."""
         if self._asked is not None and self._asked.event.block == block:
