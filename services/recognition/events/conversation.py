@@ -132,6 +132,10 @@ class Conversation:
         else:
             if self.robot_holds_floor:
                 self._writer.interject(self.id, at, "interruption", at)
+            elif (said := self._scene.robot_spoken) is not None and said.since <= at:
+                # Said to the robot while it speaks to others: it has no other reading.
+                self._writer.interject(self.id, at, "open", at)
+                self._writer.interject(self.id, at, "interruption", at)
             self._human_turn(at, "speak", confidence)
 
     def falls_silent(self, at: Seconds) -> None:
@@ -176,7 +180,7 @@ class Conversation:
     @property
     def _is_worded(self) -> bool:
         """True if words of what the person says now may come, and would decide what it is."""
-        return self.pair.robot_holds_turn and self.id in self._scene.worded
+        return self.robot_holds_floor and self.id in self._scene.worded
 
     def _sign_is_due(self, at: Seconds) -> None:
         """Decide the sign: its speech has become too long for a backchannel, or its words have not come."""
@@ -259,11 +263,9 @@ class Conversation:
                 pair.ends("speak", self._brief[1], by_robot=False)
 
     def _listens(self, since: Seconds) -> bool | None:
-        """True if the words of a speech are a listener's; None: they are unknown, or not said to the robot's turn."""
-        words, pair = self._writer.text_of(self.id, since), self.pair
-        if not words or not pair.robot_holds_turn or pair.event is None or since < pair.event.started:
-            return None
-        return is_listening(words)
+        """True if the words of a speech are a listener's; None: they are unknown, or the robot's turn is over."""
+        words = self._writer.text_of(self.id, since)
+        return is_listening(words) if words and self.robot_holds_floor else None
 
     def resumes(self, event: OngoingEvent, at: Seconds) -> None:
         """Go on with a pair of a former life of recognition."""
@@ -358,6 +360,7 @@ class Conversation:
         """Turn undecided speech that outlasts the other's turn into a turn of its own."""
         if not self.robot_holds_floor:
             self._keep_floor(at)
+            self._brief = None
         if self.robot_backchannel.state == UNDECIDED and not self.holds_floor:
             self._robot_takes_floor(at, "outlasts_turn")
 

@@ -100,6 +100,8 @@ class OngoingEvent(Struct, kw_only=True):
     duration: Seconds | None = None
     response: Action | None = None
     answered_by: str = ""
+    is_to_several: bool = False
+    """Adjacency pair: the robot has asked others in the same turn, and whoever answers first answers for all."""
     confidence: Probability = 1.0
     """Least confidence of the observations on which the event rests."""
     changed: Seconds | None = None
@@ -132,6 +134,8 @@ class EventWriter:
         """Words of speeches, by person and start."""
         self._spoken: Latest[str, tuple[OngoingEvent, ConnectionEvent]] = Latest(TEXTS_KEPT)
         """Events with speech of a person, each as it was last told."""
+        self.answered: list[tuple[OngoingEvent, Seconds]] = []
+        """Questions to several people that have just been answered by one of them, or by somebody else, and when."""
 
     def take(self) -> list[Effect]:
         """Return the effects since the last call."""
@@ -153,6 +157,10 @@ class EventWriter:
         if state == "failed" and not retold:
             event.delay = at - event.started
         begins, ends = state == "started", state == "completed"
+        if event.is_to_several and event.response is not None and not begins:
+            event.answered_by = event.answered_by or event.responder
+            if state in ("succeeded", "preempted"):
+                self.answered.append((event, at))
         knows_delay = not begins and (state == "failed" or not event.is_former)
         told = ConnectionEvent(
                 id=event.id, kind=event.kind, initiator=event.initiator, responder=event.responder, state=state,

@@ -11,7 +11,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import FORGOTTEN_AFTER, Deadlines
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.machine import EventWriter, Mishap, PersonForgotten
+from engage_hri.services.recognition.events.machine import EventWriter, Mishap, OngoingEvent, PersonForgotten
 from engage_hri.services.recognition.events.person import PersonRecognition
 from engage_hri.services.recognition.events.scene import SessionScene, TakenUp
 
@@ -145,6 +145,10 @@ class People:
             taken_up = scene.taken_up.pop()
             if taken_up.asked in self.persons:
                 self._apply(self.persons[taken_up.asked], at, partial(_answered_by_other, taken_up))
+        while self._writer.answered:
+            told = partial(_answered_for_all, *self._writer.answered.pop())
+            for person in list(self._here.values()):
+                self._apply(person, at, told)
         if self._silences != scene.silences:
             self._silences = scene.silences
             self._looks_may_direct(at)
@@ -193,3 +197,8 @@ def _answered_by_other(taken_up: TakenUp, asked: PersonRecognition) -> None:
     """Tell the person who was asked that somebody else has answered."""
     _, by, action, at = taken_up
     asked.talk.take(at, lambda talk: talk.pair.other_answers(by, action, at))
+
+
+def _answered_for_all(answered: OngoingEvent, at: Seconds, asked: PersonRecognition) -> None:
+    """Tell a person that the robot's question to several people, maybe to this one, has been answered."""
+    asked.talk.take(at, lambda talk: talk.pair.answered_for_all(answered, at))

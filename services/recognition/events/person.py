@@ -361,7 +361,8 @@ class PersonRecognition:
 
     def waits_for(self, block: str, name: str) -> bool:
         """True if a time limit runs from this sync point of a block of the robot."""
-        return any(machine.waits_for(block, name) for machine in self.gaze_machines())
+        clocks = [clock for machine in self.gaze_machines() for clock in machine.clocks_of(block)]
+        return any(name in clock.waiting for clock in clocks)
 
     def point_realised(self, block: str, name: str, at: Seconds) -> None:
         """Take a realised sync point of a block of the robot: time limits may run from there."""

@@ -463,12 +463,24 @@ class Session:
     def _ask(self, person: PersonRecognition, event: OngoingEvent, wanted: Event) -> None:
         event.accept = wanted.accept or ACCEPT
         at = event.started
+        asked = [each for each in self._live.values() if each.kind == "adjacency_pair" and each.turn == event.turn]
+        for each in asked if event.turn and len(asked) > 1 else ():
+            each.is_to_several = True
+        self._speaks_to(person.id, event.block, at)
         turn_end = self._ended_turns.get(event.turn) if event.turn else self.blocks.ended.get(event.block)
         person.talk.take(at, lambda talk: talk.robot_asks(event))
         if turn_end is None:
             self._opens(event.turn, event.responder)
         else:
             person.talk.take(at, lambda talk: talk.turn_ends(max(turn_end, at)))
+
+    def _speaks_to(self, actor: str, block: str, at: Seconds) -> None:
+        """Note another addressee of what the robot says in this block already: it has announced them one by one."""
+        said = self.scene.robot_spoken
+        speaks = any(name.startswith(f"{block}:") and action == "speak" for name, action in self._robot_actions)
+        if speaks and actor and said is not None and said.to is not None and not said.is_to(actor):
+            said.to |= {actor}
+            self._tell(actor, at, lambda talk: talk.robot_speaks(max(said.since, at), listens=False))
 
     def _opens(self, turn: str, addressee: str) -> None:
         """Note a turn of the robot that goes on over several blocks."""
@@ -507,14 +519,21 @@ class Session:
                 repairs = signal.signal == "repaired"
                 self.announce(request)
                 self._opens(signal.turn, signal.actor)
+                self._speaks_to(signal.actor, request.block, at)
                 self._tell(signal.actor, at, lambda talk: talk.is_answered(at, repairs=repairs))
                 if request.block and request.block not in self.blocks.ended:
                     self._answering_blocks[request.block] = signal.actor
             case "aborted":
                 self._aborted_turns[signal.turn] = at
                 self._closes(signal.turn)
-                self._apply_to_addressees(signal.actor, at, lambda person: person.abort(at, turn=signal.turn))
+                self._abort(signal.actor, at, signal.turn)
         self._writer.effects.append(TurnOutcome(id=request.id, at=self._writer.stamp(at)))
+
+    def _abort(self, actor: str, at: Seconds, turn: str) -> None:
+        """End the pairs of a turn that was cut off; first that of who has cut in, which may answer for all."""
+        here = [person for person in self.persons.values() if person.presence.here and actor in ("", person.id)]
+        for person in sorted(here, key=lambda each: not each.talk.takes_floor):
+            self._people.apply(person.id, at, lambda person: person.abort(at, turn=turn))
 
     def _apply_to_addressees(self, actor: str, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
         """Apply a step to a known person, or to all (actor: empty)."""

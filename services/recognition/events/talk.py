@@ -63,6 +63,11 @@ class Talk:
         return self._speech is not None and self._speech.is_to(self._scene.robot)
 
     @property
+    def takes_floor(self) -> bool:
+        """True while the person speaks to the robot, or has answered before its turn is over."""
+        return self._conversation.holds_floor or self._conversation.pair.is_interrupted
+
+    @property
     def question(self) -> Question | None:
         """The robot's question that waits for the person's answer; None: none does, or that is not known yet."""
         return None if self._line else self._conversation.pair.question

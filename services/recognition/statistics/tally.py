@@ -63,6 +63,8 @@ class Count(Struct):
 
     def decide(self, event: ConnectionEvent) -> None:
         """Count a success or a failure; nothing else changes the rates."""
+        if event.is_answered_by_another:
+            return
         if event.state == "succeeded":
             self.succeeded += 1
             if event.delay is None:
@@ -295,5 +297,9 @@ class EventTally:
         starts = [event.started.seconds for event in events]
         if not starts:
             return RecentPace()
-        judged = [event.state for event in events if not event.optional and event.state in ("succeeded", "failed")]
+        judged = [
+            event.state
+            for event in events
+            if not event.optional and event.state in ("succeeded", "failed") and not event.is_answered_by_another
+        ]
         return RecentPace(min(starts), max(starts), len(starts), judged.count("failed"), len(judged))
