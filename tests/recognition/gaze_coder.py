@@ -214,10 +214,12 @@ class GazeCoder:
         if human is None:
             return at
         ends = min(human.until, self._directs(at) if target == HUMAN else NEVER)
+        had_come = begun is not None and any(
+            each.target == target and each.until > begun and each.since < at for each in self._robot
+        )
+        if robot is not None and robot.since == at == human.since and had_come:
+            return at  # it had left, and comes back when the person has been there
         if robot is None:
-            had_come = begun is not None and any(
-                each.target == target and each.until > begun and each.since <= at for each in self._robot
-            )
             if begun is None or had_come:
                 return at
             comes = self._comes(self._robot, target, at)
