@@ -215,6 +215,7 @@ class Manager:
 
     def farewell(self) -> Plan[None]:
         yield AwaitDeparture(FAREWELL)
+        yield Pause(GONE)
 
     def _request(self, id: str, instruction: Instruction, how: str) -> TurnFragment:
         """how: key of `ASKING`. Whoever is helped is shown the place, too."""
@@ -293,3 +294,5 @@ def task(manager: Manager) -> Plan[None]:
     yield from manager.say("finished", (finished,), look=False)
     yield from manager.say("goodbye", ("Thanks for playing. That was fun, goodbye.",), look=False)
     yield from manager.farewell()
+GONE: Seconds = 2.5
+"""Time from a person's leaving until recognition has ended all that was open with them: they might have come back."""
