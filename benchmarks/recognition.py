@@ -67,14 +67,14 @@ class Recognition:
 
     @property
     def _deadline(self) -> Seconds | None:
-        times = (self.session.deadline, self.published.deadline)
-        return min((at for at in times if at is not None), default=None)
+        session, published = self.session.deadline, self.published.deadline
+        if session is None or published is None:
+            return session if published is None else published
+        return min(session, published)
 
     def _tell(self, effects: list[Effect], now: Seconds) -> None:
-        events = [effect for effect in effects if isinstance(effect, ConnectionEvent)]
-        busy = self.session.busy
-        contacts = {actor: much for actor, much in self.session.contacts().items() if much is not None}
-        self.published.feed(events, busy, now, contacts)
+        events = [effect for effect in effects if isinstance(effect, ConnectionEvent)] if effects else []
+        self.published.feed(events, self.session.busy, now, self.session.contacts())
         if self.log is not None:
             self.log += events
 

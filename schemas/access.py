@@ -189,7 +189,7 @@ TABLE: tuple[Row, ...] = (
         "generation", keys.FRAGMENT_FEEDBACK, keys.TURN_CLOSED, keys.HEAD_OWNER, keys.STUDY_CONDITION,
         heard=(keys.ANY_REQUEST_STATE, keys.FEEDBACK, keys.ANY_CONNECTION_EVENT, keys.WORLD, keys.SYNC_POINT,
                keys.ANY_ACTION, keys.ANY_PERCEIVED_ONGOING, keys.UTTERANCE, keys.ROBOT_STATE, keys.ANY_STATISTICS,
-               keys.ANY_INTERJECTION),
+               keys.ANY_INTERJECTION, keys.FLOOR),
     ),
     *_commands("generation", "block", "behavior", "turn"),
     Row("generation", "asks", keys.DESCRIBE),

@@ -304,7 +304,7 @@ class TurnSignal(Behavior, frozen=True, kw_only=True, tag="turn", omit_defaults=
     turn: str
     signal: Literal["ended", "answered", "repaired", "aborted"]
     actor: str = ""
-    """The addressee."""
+    """The addressee; empty: all to whom the turn is."""
 
 
 class Unknown(Behavior, frozen=True, kw_only=True, tag="unknown", omit_defaults=True):

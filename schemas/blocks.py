@@ -183,7 +183,7 @@ Steer = Literal["hold", "continue", "stop"]
 
 - hold: every behavior waits where it next can, at a hold point or between two words; nothing begins, clocks stop,
   nothing counts as late for it. What is held for longer than `realizer.longest_hold` is stopped.
-- continue: it goes on from there, whoever held it.
+- continue: it goes on from there, whoever held it (but see `SteerPerformance.own`).
 - stop: it ends safely; blocks end as interrupted.
 """
 
@@ -193,11 +193,13 @@ class SteerPerformance(Request, frozen=True, kw_only=True, tag="steer_performanc
 
     block: id of a live block. behavior: of that block; empty: all of it, so that to continue the block lets all its
     behaviors go, too. To hold a behavior that is past its last hold point is refused: it goes on to its end.
+    own: to continue it lets go only what nobody but its requester holds.
     """
 
     to: Steer
     block: str
     behavior: str = ""
+    own: bool = False
 
 
 class SteerRobot(Request, frozen=True, kw_only=True, tag="steer_robot", omit_defaults=True):

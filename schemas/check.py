@@ -87,6 +87,9 @@ def problems(thing: Input) -> Iterator[Problem]:
     if isinstance(thing, TurnFragment) and thing.within is not None and not 0 < thing.within <= LONGEST_WITHIN:
         advice = f"seconds, more than 0 and at most {LONGEST_WITHIN:g}"
         yield Problem(f"within is {thing.within:g}", "$.within", "", thing.line, advice)
+    if isinstance(thing, TurnFragment) and (after := thing.interruptible_after) is not None and not after >= 0:
+        reason = f"interruptible_after is {after:g}"
+        yield Problem(reason, "$.interruptible_after", "", thing.line, "seconds, not less than 0")
     for index, behavior in enumerate(thing.behaviors):
         yield from _behavior(behavior, f"$.behaviors[{index}]")
     yield from _needs(thing)

@@ -21,6 +21,10 @@ LONGEST_WITHIN: Seconds = 120.0
 """Longest time that a fragment may give for its answer."""
 
 
+EVERYBODY = "*"
+"""Stands for all people who are there; nobody can have it for an id."""
+
+
 class TurnFragment(Struct, frozen=True, kw_only=True, tag="fragment", omit_defaults=True):
     """A turn or a part of one, to be spoken and acted. Thesis 3.2.
 
@@ -30,7 +34,12 @@ class TurnFragment(Struct, frozen=True, kw_only=True, tag="fragment", omit_defau
     person speaks.
     behaviors: speech and references are performed in the order in which they are written, others by their timing.
     constraints: between sync points of these behaviors.
-    addressee: id of the person spoken to; empty: the only person in the world.
+    addressee: ids of those spoken to, one or several, or `*`: all people in the world; empty: the only one there. The
+    robot looks from one to the next, and whoever answers first has answered for all.
+    interruptible: who may interrupt it: ids, or `*`; True: those spoken to; False: nobody. None: as the `beginning`
+    of its turn says, and else True. That of a `beginning` is for the pauses of its turn, too.
+    interruptible_after: seconds for which somebody must have spoken into it to interrupt it. None: as the `beginning`
+    of its turn says, and else 0.
     delay: hold the turn after this fragment while the manager thinks, with the eyes on `delay_target`.
     delay_target: id of an entity; empty: a surface, away from the face.
     accept: the actions that answer the adjacency pair of this turn; empty: recognition's default.
@@ -43,7 +52,9 @@ class TurnFragment(Struct, frozen=True, kw_only=True, tag="fragment", omit_defau
     turn_status: TurnStatus = "full"
     behaviors: tuple[FragmentBehavior, ...] = ()
     constraints: tuple[Constraint, ...] = ()
-    addressee: str = ""
+    addressee: str | tuple[str, ...] = ""
+    interruptible: bool | str | tuple[str, ...] | None = None
+    interruptible_after: Seconds | None = None
     delay: bool = False
     delay_target: str = ""
     accept: tuple[Action, ...] = ()
@@ -56,10 +67,20 @@ class TurnFragment(Struct, frozen=True, kw_only=True, tag="fragment", omit_defau
     line: int = 0
 
     @property
+    def addressees(self) -> tuple[str, ...]:
+        """All that `addressee` names, each once, in order."""
+        return tuple(dict.fromkeys(filter(None, ids_in(self.addressee))))
+
+    @property
     def worded(self) -> tuple[str, ...]:
         """Ids of its speeches and references that have words, in order."""
         spoken = [each for each in self.behaviors if isinstance(each, Reference | Speech)]
         return tuple(each.id for each in spoken if isinstance(each, Reference) or has_words(each.text))
+
+
+def ids_in(named: str | tuple[str, ...]) -> tuple[str, ...]:
+    """The ids of a field that takes one or several."""
+    return (named,) if isinstance(named, str) else named
 
 
 class PerformFragment(Request, frozen=True, kw_only=True, tag="perform_fragment", omit_defaults=True):
@@ -192,7 +213,8 @@ class FragmentOutcome(Outcome, frozen=True, kw_only=True, tag="fragment_outcome"
 class TurnClosed(Struct, frozen=True, kw_only=True, tag="turn_closed", omit_defaults=True):
     """evt: generation: a turn of the robot is over: its fragments have ended and its adjacency pair is decided.
 
-    turn: id of the fragment that opened it. addressee: id of the person.
+    turn: id of the fragment that opened it. addressee: id of the person; of several that of the one named first.
+    others: ids of the others.
     status: `aborted`: a barge-in, fault, cancellation or silence ended it; `reason` says which.
     fragments: their ids, in order.
     """
@@ -200,6 +222,7 @@ class TurnClosed(Struct, frozen=True, kw_only=True, tag="turn_closed", omit_defa
     turn: str
     addressee: str
     status: Literal["done", "aborted"]
+    others: tuple[str, ...] = ()
     reason: str = ""
     fragments: tuple[str, ...] = ()
     spoken: tuple[SpokenText, ...] = ()

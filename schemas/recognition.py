@@ -59,7 +59,8 @@ class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event",
     """Adjacency pair: the action that answered. Of a failed one: the answer that came after the limit, before anybody
     began another turn; `delay` is then that of this answer."""
     answered_by: str = ""
-    """Adjacency pair of the robot that was `preempted`: the person who answered in the responder's place."""
+    """Adjacency pair of the robot that was asked of several people, or `preempted`: the person who answered. One that
+    another of those who were asked has answered is `succeeded`, too, but counts for nobody."""
     confidence: Probability = 1.0
     """Least confidence of the observations by which it began and was answered; so far, when `started`."""
     block: str = ""
@@ -75,6 +76,11 @@ class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event",
     def person(self, robot: str) -> str:
         """Actor id of the person who takes part in it. robot: the robot's own actor id."""
         return self.responder if self.initiator == robot else self.initiator
+
+    @property
+    def is_answered_by_another(self) -> bool:
+        """True of a question that somebody else than its responder has answered: it says nothing of that person."""
+        return self.answered_by not in ("", self.responder)
 
     @property
     def session(self) -> str:

@@ -17,7 +17,7 @@ from msgspec.structs import replace
 from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.advice import allowed
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.fragments import TurnFragment, TurnStatus
+from engage_hri.schemas.fragments import EVERYBODY, TurnFragment, TurnStatus
 from engage_hri.schemas.text import word_count
 from engage_hri.schemas.units import Probability
 from engage_hri.schemas.world import Entity, World
@@ -126,7 +126,11 @@ class ToolInput(Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_un
         ),
     ] = False
     addressee: Annotated[
-        str, Meta(description="Id of the person to speak to; left out or empty if there is only one.")
+        str | tuple[str, ...],
+        Meta(
+            description="Id of the person to speak to, a list of ids, or `*` for all; left out or empty if there is "
+            "only one."
+        ),
     ] = ""
     within: Annotated[
         Literal[0, 3, 6, 10, 20, 30, 60],
@@ -176,13 +180,15 @@ def input_schema(world: World | None = None) -> Schema:
         _, refer, look, _ = parts
         if is_listed(world):
             people = [person.id for person in world.people]
-            for schema, field, ids in (
-                (whole, "addressee", ["", *people] if people else []),
-                (refer, "refer", [thing.id for thing in world.objects]),
-                (look, "look", [each.id for each in world.entities if each.kind != "hand"]),
+            one, several = whole["properties"]["addressee"]["anyOf"]
+            for schema, ids in (
+                (one, ["", EVERYBODY, *people] if people else []),
+                (several["items"], people),
+                (refer["properties"]["refer"], [thing.id for thing in world.objects]),
+                (look["properties"]["look"], [each.id for each in world.entities if each.kind != "hand"]),
             ):
                 if ids:
-                    schema["properties"][field]["enum"] = ids
+                    schema["enum"] = ids
         if told := _inventory(world):
             refer["properties"]["refer"]["description"] += f" There are: {told}."
     return whole

@@ -195,14 +195,24 @@ def behaviors_inside(speech: etree._Element, *, is_strict: bool) -> Iterator[etr
 # -- from attributes to structs ------------------------------------------------------------------------------------
 
 _HANDS = {"LEFT": "LEFT_HAND", "RIGHT": "RIGHT_HAND", "BOTH": "BOTH_HANDS", "": None}
+
+
+def _one_or_several(text: str) -> str | list[str]:
+    ids = text.split()
+    return ids if len(ids) > 1 else "".join(ids)
+
+
 _SPELLED: Mapping[str, Callable[[str], Any]] = {
     "accept": str.split,
+    "addressee": _one_or_several,
+    "interruptible": lambda text: {"true": True, "false": False}.get(text.strip().lower(), _one_or_several(text)),
     "composition": lambda text: text.strip().upper(),
     "needs": str.split,
     "mode": lambda text: _HANDS.get(text.upper(), text.upper()),
     "side": str.upper,
 }
 """Readers of attributes that may be spelled more freely than the field."""
+
 _NEVER_SET = ("line", "timing", "marks", "unread", "expressions", "poses")
 """Fields that no attribute can set."""
 

@@ -86,7 +86,8 @@ def _fragment(message: FragmentOutcome) -> Entry:
 
 def _turn(message: TurnClosed) -> Entry:
     reason = f" ({message.reason})" if message.reason else ""
-    return INFO, f"turn {message.turn} to {message.addressee}: {message.status}{reason}"
+    people = ", ".join((message.addressee, *message.others))
+    return INFO, f"turn {message.turn} to {people}: {message.status}{reason}"
 
 
 def _event(message: ConnectionEvent) -> Entry:

@@ -106,12 +106,21 @@ class Robot(OrderedRobot):
         self._words = NewWords()
 
     async def perform(
-        self, fragment: FragmentSource, *, await_answer: bool = False, timeout: Seconds | None = None
+        self,
+        fragment: FragmentSource,
+        *,
+        addressee: str | tuple[str, ...] | None = None,
+        interruptible: bool | str | tuple[str, ...] | None = None,
+        await_answer: bool = False,
+        timeout: Seconds | None = None,
     ) -> FragmentOutcome:
         """Perform a turn fragment; returns when it is done or was interrupted.
 
         fragment: a `TurnFragment`, the path of a file with EBML or JSON, such a text itself, or JSON as a dict; also
         the tool input of a language model.
+        addressee: to whom, in place of what the fragment says: an id, several, or `*` for all; None: as it says.
+        interruptible: who may interrupt it, in place of what the fragment says: ids, `*`, True for those spoken to,
+            False for nobody; None: as it says.
         await_answer: if it ends a turn, return only when that has been answered, or it is too late; `events` tell,
             and `heard` has the words.
         timeout: seconds to wait for it to be accepted, for example until generation is there; None: for ever.
@@ -123,6 +132,10 @@ class Robot(OrderedRobot):
         """
         taken(timeout, Seconds | None, "timeout")
         parsed = fragment_in(fragment, self._unnamed())
+        if addressee is not None:
+            parsed = replace(parsed, addressee=addressee)
+        if interruptible is not None:
+            parsed = replace(parsed, interruptible=interruptible)
         return await self._end_of(self._send(parsed), await_answer=await_answer, timeout=timeout)
 
     def _send(self, fragment: TurnFragment) -> Pending:
@@ -170,7 +183,7 @@ class Robot(OrderedRobot):
                         return _without_an_answer(outcome)
                 # An earlier turn of the same name, told again, has other events.
                 elif fragment.id in told.fragments and events <= {event.id for event in told.events}:
-                    return replace(outcome, events=told.events, heard=told.heard)
+                    return replace(outcome, events=told.events, heard=told.heard, interjections=told.interjections)
         return outcome
 
     async def realize(

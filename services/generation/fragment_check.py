@@ -27,7 +27,7 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.check import validated
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.fragments import EVERYBODY, TurnFragment
 from engage_hri.schemas.references import SyncRef, rewritten
 from engage_hri.schemas.tool import in_call
 from engage_hri.schemas.world import World
@@ -89,10 +89,19 @@ def renamed(fragment: TurnFragment, name: Callable[[Name], str]) -> TurnFragment
         target = named(each.target, "object", f"{path}.target", each.line)
         return replace(each, target=target, options=None if each.options is None else tuple(options))
 
+    def people(ids: str | tuple[str, ...], path: str) -> str | tuple[str, ...]:
+        if isinstance(ids, str):
+            return named(ids, "person", path, fragment.line)
+        return tuple(named(id, "person", f"{path}[{n}]", fragment.line) for n, id in enumerate(ids))
+
+    interrupting = fragment.interruptible
+    if isinstance(interrupting, str | tuple):
+        interrupting = people(interrupting, "$.interruptible")
     return replace(
         fragment,
         behaviors=tuple(behavior(each, f"$.behaviors[{n}]") for n, each in enumerate(fragment.behaviors)),
-        addressee=named(fragment.addressee, "person", "$.addressee", fragment.line),
+        addressee=people(fragment.addressee, "$.addressee"),
+        interruptible=interrupting,
         delay_target=named(fragment.delay_target, "entity", "$.delay_target", fragment.line),
     )
 
@@ -234,7 +243,12 @@ def checked(fragment: TurnFragment, world: World, robot: str) -> TurnFragment:
         for index, behavior in enumerate(fragment.behaviors):
             if isinstance(behavior, Reference):
                 _check_timing(fragment, index, behavior)
-        return replace(fragment, addressee=addressee(fragment, world), delay_target=_delay_target(fragment, world))
+        people = addressees(fragment, world)
+        return replace(
+            fragment,
+            addressee=people if len(people) > 1 else "".join(people),
+            delay_target=_delay_target(fragment, world),
+        )
 
 
 def check_world(fragment: TurnFragment, world: World, robot: str) -> None:
@@ -268,25 +282,26 @@ def lacks_people(fragment: TurnFragment, world: World) -> bool:
     return not world.people and (begins or bool(fragment.addressee))
 
 
-def addressee(fragment: TurnFragment, world: World) -> str:
-    """Id of the person spoken to: the one that is named, else the only one there is. Raises InputRefused.
+def addressees(fragment: TurnFragment, world: World) -> tuple[str, ...]:
+    """Ids of those spoken to: those that are named, else the only one there is. Raises InputRefused.
 
-    Empty for a `middle` or `end` that names nobody: the fragment that began the turn has named the addressee.
+    None for a `middle` or `end` that names nobody, or all: the fragment that began the turn has named its addressees.
     """
     people = [person.id for person in world.people]
-    if fragment.addressee:
-        if fragment.addressee not in people:
+    for name in names(fragment):
+        if name.kind == "person" and name.id not in (*people, EVERYBODY):
             advice = f"people: {', '.join(people)}" if people else "the world knows nobody"
-            reason = f"the world does not know the person {fragment.addressee!r}"
-            raise _refused(fragment, "$.addressee", reason, fragment.line, advice)
-        return fragment.addressee
-    if fragment.turn_status in ("middle", "end"):
-        return ""
-    if len(people) != 1:
+            raise _refused(fragment, name.path, f"the world does not know the person {name.id!r}", name.line, advice)
+    is_to_all = EVERYBODY in fragment.addressees
+    if fragment.turn_status in ("middle", "end") and (is_to_all or not fragment.addressees):
+        return ()
+    if fragment.addressees and not is_to_all:
+        return fragment.addressees
+    if len(people) != 1 and not (people and is_to_all):
         reason = f"no addressee, and the world knows {len(people) or 'no'} people"
         advice = f"name one of {', '.join(people)}" if people else "the world needs a person to speak to"
         raise _refused(fragment, "$.addressee", reason, fragment.line, advice)
-    return people[0]
+    return tuple(people)
 
 
 def _delay_target(fragment: TurnFragment, world: World) -> str:

@@ -279,7 +279,8 @@ class Fragments:
                 performance.is_held = is_held
                 self._holds += 1
                 id = f"{performance.block_id}/hold-{self._holds}"
-                steer = SteerPerformance(id=id, to="hold" if is_held else "continue", block=performance.fragment.id)
+                to: Literal["hold", "continue"] = "hold" if is_held else "continue"
+                steer = SteerPerformance(id=id, to=to, block=performance.fragment.id, own=True)
                 self._tell(SendRequest(keys.BLOCK, steer))
 
     def _enforce_inhibitions(self, performance: FragmentPerformance, permits: Permits) -> None:
@@ -411,7 +412,7 @@ class Fragments:
 
     def _heard_in(self, turn: TurnPlan) -> Discourse:
         """The discourse at the start of `turn`. A backchannel is said in the other's turn, and changes nothing."""
-        return self._discourse if turn.backchannel else self._discourse.in_turn(turn.turn, turn.addressee)
+        return self._discourse if turn.backchannel else self._discourse.in_turn(turn.turn, turn.addressees)
 
     # -- references, chosen again while their fragments go on -----------------------------------------------------
 
@@ -494,6 +495,8 @@ class Fragments:
             return
         self._signals += 1
         id = f"turn-aborted-{self._signals}"
-        signal = TurnSignal(id=id, turn=aborted.turn, signal="aborted", actor=aborted.addressee)
+        signal = TurnSignal(
+            id=id, turn=aborted.turn, signal="aborted", actor=aborted.addressee if aborted.is_to_one else ""
+        )
         request = SignalTurn(id=f"{self._session}/{id}", signal=signal, at=Stamp(self._clock.name, now))
         self._tell(SendRequest(keys.TURN, request))

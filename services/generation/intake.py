@@ -30,7 +30,7 @@ from engage_hri.schemas.fragments import (
 )
 from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions, Utterance
-from engage_hri.schemas.recognition import ConnectionEvent, Interjection, Statistics, session_of
+from engage_hri.schemas.recognition import ConnectionEvent, Floor, Interjection, Statistics, session_of
 from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused, Unreadable, kind_of
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import COVERED_FOR, CoveredObjects, World
@@ -52,7 +52,8 @@ does. Ours."""
 
 Told = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | OngoingActions | World | RobotState | Statistics
-    | ConnectionEvent | Interjection | Utterance | SyncPointProgress | WordSpoken | Unreadable | PeerAlive | PeerGone
+    | ConnectionEvent | Floor | Interjection | Utterance | SyncPointProgress | WordSpoken | Unreadable | PeerAlive
+    | PeerGone
 )  # fmt: skip
 """Messages that generation takes into account, besides requests."""
 Asked = PerformFragment | Inhibit | SetCondition | Cancel
@@ -165,7 +166,7 @@ class GenerationIntake:
                 self._fragments.feed(message, now)
                 if not message.retold:
                     self._arbiter.feed(message, now)
-            case RobotState() | Statistics():
+            case RobotState() | Statistics() | Floor():
                 self._arbiter.feed(message, now)
             case Interjection() | Utterance() | SyncPointProgress() | WordSpoken():
                 self._fragments.feed(message, now)

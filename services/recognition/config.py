@@ -49,6 +49,9 @@ class RecognitionConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Longest speech that is still a backchannel."""
     least_confidence: Probability = 0.4
     """Least confidence of an observation: a beginning below is ignored, a thing below counts as covered. Ours."""
+    memory: str = ""
+    """File in which recognition keeps its counts and open pairs, so that they go on when its process has ended and is
+    started again on this machine. Empty: they begin anew."""
     sensing: Sensing = Sensing()
     """Settings for raw perception."""
     window: Seconds = 30.0

@@ -34,13 +34,16 @@ from engage_hri.schemas.recognition import (
     Floor,
     FloorSpeech,
     Interjection,
+    OpenEvents,
     RequestEvent,
     SignalTurn,
+    Statistics,
     TurnOutcome,
 )
 from engage_hri.schemas.requests import Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
+from engage_hri.services.bus.deadlines import FORGOTTEN_AFTER
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import Mishap, PersonForgotten
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
@@ -64,9 +67,9 @@ from engage_hri.services.runtime.intake import (
 Content = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | OngoingActions | World | RobotState | HeadOwner
     | SyncPointProgress | BlockProgress | HeadPose | VoiceActivity | Utterance | RequestEvent | SignalTurn | Cancel
-    | PeerAlive | PeerGone
+    | PeerAlive | PeerGone | Statistics | OpenEvents
 )  # fmt: skip
-"""Messages that recognition takes into account."""
+"""Messages that recognition takes into account; the last two are those of its former life, and come by no bus."""
 _CONTENT = get_args(Content)
 _News = ActionBegan | ActionEnded | ActorFound | ActorLost | HeadPose | VoiceActivity | Utterance
 """Messages that tell of what has just happened."""
@@ -94,6 +97,8 @@ class Intake:
         self._reports = ActionReports(robot, REPORT_GRACE, clock.name, self._instant)
         self._clock_errors = ClockErrors(robot)
         self._restarts = ClockRestarts()
+        self._former_until: Seconds = -inf
+        """Time until which a former life has told all events, as far as is known."""
         self._source = ""
         """Who has sent the message that is being taken."""
         self._recognizer = Recognizer(robot, config, clock=clock.name, name=f"{session}-", strict=False)
@@ -126,6 +131,9 @@ class Intake:
         message = input.message
         if isinstance(message, Cancel):
             self._feed(message, now)
+        elif isinstance(message, Statistics | OpenEvents):
+            if not input.key:
+                self._resume(message, now)
         elif self._is_credible(input):
             if isinstance(message, _News) and not input.past:
                 told = self._clock.local(message.at, now)
@@ -136,6 +144,23 @@ class Intake:
             elif not isinstance(message, Read):
                 self._feed(message, self._when(message, input.at))
         return self._take()
+
+    def _resume(self, state: Statistics | OpenEvents, now: Seconds) -> None:
+        """Go on from a state of a former life that was told on this clock, not long ago."""
+        if state.at.clock != self._clock.name or not now - FORGOTTEN_AFTER < state.at.seconds <= now:
+            return
+        self._former_until = max(self._former_until, state.at.seconds)
+        if isinstance(state, Statistics):
+            self._statistics.resume(state, now)
+            self._note(())
+            return
+        pairs = [each for each in state.events if each.kind == "adjacency_pair" and each.state == "started"]
+        for former in pairs[-1:]:  # one before it has been answered, by the robot's own first turn
+            effects = self._recognizer.session.resume(former, now)
+            for effect in effects:
+                if isinstance(effect, ConnectionEvent):
+                    self._statistics.resume_event(effect)
+            self._note(effects)
 
     def _take(self) -> list[Output]:
         outputs, self._outputs = self._outputs, []
@@ -156,6 +181,8 @@ class Intake:
         for observation, at, is_sure in told:
             if not isinstance(observation, GoesOn):
                 self._note_error(observation.actor, observation.at, at, is_sure=is_sure)
+            if isinstance(observation, ActionBegan) and at <= self._former_until:
+                observation = GoesOn(began=observation, since=at)
             self._feed(observation, at)
 
     def _feed(self, observation: Perceived, at: Seconds) -> None:

@@ -198,7 +198,7 @@ class Recognizer:
             case ActionBegan(actor=self.session.robot, action="speak", behavior=behavior) if (
                 self.session.in_company and self.session.addressees_of(behavior) is None
             ):
-                self._unaddressed[behavior.rpartition(":")[0]] = at
+                self._unaddressed[behavior.rpartition(":")[0]] = math.nextafter(at, -math.inf)  # it waits itself
             case ActionBegan(actor=actor) | ActionEnded(actor=actor) if actor != self.session.robot:
                 self._words.follow(observation, at)
             case GoesOn(began=began, since=since) if began.actor != self.session.robot:

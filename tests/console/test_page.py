@@ -120,6 +120,21 @@ async def test_a_panel_that_fails_stops_neither_the_others_nor_the_next_frames(p
         assert [sum(what in error for error in page.errors) for what in ("broken panel", "broken clock")] == [1, 1]
 
 
+async def test_who_speaks_to_whom_is_told_with_what_a_speech_into_the_turn_was_taken_for(place: Place) -> None:
+    speeches = [
+        {"actor": "robot", "to": ["ann"], "since": 0.1, "until": None, "taken": "", "words": ""},
+        {"actor": "ann", "to": [], "since": 0.4, "until": None, "taken": "takes the floor", "words": "wait"},
+        {"actor": "ben", "to": ["robot"], "since": 0.2, "until": 0.3, "taken": "", "words": ""},
+    ]
+    measured = {"actor": "ann", "level": "engaging", "reasons": [], "engagement": [], "mtbce": []}
+    async with opened(place) as page:
+        await take(page, sections={"floor": speeches, "measures/ann": measured})
+
+        told = "document.querySelector('#floor canvas').getAttribute('aria-label')"
+        await page.until(f"{told}?.includes('robot to ann, ann takes the floor: “wait”. ann is engaging.')")
+        assert page.errors == []
+
+
 async def test_two_references_of_one_name_are_both_listed(place: Place) -> None:
     async with opened(place) as page:
         choice = {"fragment": "f", "reference": "r", "target": "blue", "gesture": "gaze", "phrase": "it",
@@ -165,7 +180,7 @@ async def test_a_panel_whose_service_is_gone_says_in_its_heading_that_it_stands_
     heading = "document.querySelector('#measures h2').textContent"
     async with opened(place) as page:
         await take(page, sections={"health": services("recognition", "control")})
-        assert await page.value(stale) == "scene,above,events,measures"
+        assert await page.value(stale) == "scene,above,floor,events,measures"
         assert await page.value(heading) == "Engagement as it was last: recognition is not on the bus"
         away = "document.querySelector('.away').textContent"
         assert await page.value(away) == (

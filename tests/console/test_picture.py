@@ -4,6 +4,7 @@ import json
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from engage_hri.schemas.blocks import (
     BlockProgress,
@@ -24,7 +25,14 @@ from engage_hri.schemas.fragments import Claim, FragmentOutcome, HeadOwner, Pair
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.participants import BusHealth, PeerAlive, PeerGone, Status
 from engage_hri.schemas.perception import ActionBegan, ActorFound, ActorLost, Utterance
-from engage_hri.schemas.recognition import Statistics, WindowStatistics
+from engage_hri.schemas.recognition import (
+    Floor,
+    FloorSpeech,
+    Interjection,
+    InterjectionReading,
+    Statistics,
+    WindowStatistics,
+)
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.console import view
@@ -157,6 +165,45 @@ def test_the_owner_of_the_head_has_its_reason_and_those_who_wait_have_theirs() -
     assert (head["since"], head["owner"]["reason"]) == (2.5, "ref-2")
     assert (head["owner"]["does"], head["owner"]["why"]) == ("look at blue", "this belongs to what it is saying")
     assert [(each["target"], each["why"]) for each in head["waiting"]] == [("ann", "it spoke to this person last")]
+
+
+def test_speeches_overlap_and_say_for_whom_they_are_and_what_those_into_the_turn_were_taken_for() -> None:
+    robot = FloorSpeech(actor="robot", since=at(11.0), to=("ann",))
+    ann, ben = FloorSpeech(actor="ann", since=at(12.0)), FloorSpeech(actor="ben", since=at(12.5))
+
+    def taken(reading: InterjectionReading, time: Seconds, words: str = "") -> Timed:
+        return Interjection(actor="ann", since=at(12.0), at=at(time), reading=reading, words=words), time
+
+    made = picture(
+        (Floor(at=at(11.0), speeches=(robot,)), 11.0),
+        (Floor(at=at(12.1), speeches=(robot, ann)), 12.1),
+        taken("open", 12.2),
+        (Floor(at=at(12.6), speeches=(robot, ann, ben)), 12.6),
+        (Floor(at=at(12.8), speeches=(robot, ben)), 12.8),
+        taken("backchannel", 13.0, "uh-huh"),
+        (Floor(at=at(13.5), speeches=(replace(ben, to=("ann",)),)), 13.5),
+    )
+
+    assert section(made, "floor") == [
+        shown("robot", 1.0, 3.5, to=["ann"]),
+        shown("ann", 2.0, 2.8, taken="as a listener", words="uh-huh"),
+        shown("ben", 2.5, None, to=["ann"]),
+    ]
+    made.feed(PeerGone(participant="recognition"), 15.0, 15.0)
+    assert [each["until"] for each in section(made, "floor")] == [3.5, 2.8, 5.0]
+
+
+def shown(actor: str, since: float, until: float | None, **fields: object) -> dict[str, object]:
+    return {"actor": actor, "to": [], "since": since, "until": until, "taken": "", "words": "", **fields}
+
+
+def test_a_typed_line_into_the_turn_is_shown_where_it_was_said_and_old_speeches_go() -> None:
+    typed = Interjection(actor="ann", since=at(12.0), at=at(12.0), reading="interruption", words="stop")
+    made = picture((typed, 12.0))
+    assert section(made, "floor") == [shown("ann", 2.0, 2.0, taken="takes the floor", words="stop")]
+
+    made.feed(Floor(at=at(12.0 + KEPT + 1.0)), 12.0 + KEPT + 1.0, 12.0 + KEPT + 1.0)
+    assert section(made, "floor") == []
 
 
 def test_an_event_keeps_its_decision_when_its_shared_phase_is_over() -> None:

@@ -52,7 +52,7 @@ def emission(
         for each, (gesture, phrase) in zip(references, made, strict=True)
     ]
     config = GenerationConfig(profile=profile)  # type: ignore[arg-type]
-    turn = plan_turn(fragment, "turn", "human")
+    turn = plan_turn(fragment, "turn", fragment.addressee or "human")
     result = Emission(fragment, turn, choices, config, permits or Permits(), hands or {}, before, apart).plan()  # type: ignore[arg-type]
     check(result.block)  # every reference of the block is sound
     return result

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 TICK = 0.125
 TIMES = {
     "DWELL": 0.25, "HAND_ONSET": 0.25, "HAND_STILLNESS": 0.75, "RESPONSE_HOLD": 0.75, "GLANCE_DURATION": 1.0,
-    "MTBCE_PRIOR": 5.75,
+    "MTBCE_PRIOR": 5.75, "ONSET": 0.625, "STAYS": 1.0,
 }  # fmt: skip
 """Times of both sides, in place of those of the arbiter."""
 FACE_LOST = 2.0
@@ -35,6 +35,9 @@ class HeadTable:
     inhibited: tuple[str, str] | None = None
     fragment: str | None = None
     answers: dict[int, Answer] = field(default_factory=dict)
+    speaks_since: float | None = None
+    listens_until: float | None = None
+    """Time until which the head is on who has spoken; infinite while they speak."""
     fast: bool = False
     fast_since: float = 0.0
     acting: bool = False
@@ -64,6 +67,12 @@ class HeadTable:
             self.answers[event].until = self.now + TIMES["RESPONSE_HOLD"]
         else:
             self.answers.pop(event, None)
+
+    def speak(self, speaks: bool) -> None:
+        if not speaks:
+            self.speaks_since = None
+        elif self.speaks_since is None:
+            self.speaks_since = self.now
 
     def move_hand(self, fast: bool) -> None:
         if fast and not self.fast:
@@ -105,9 +114,12 @@ class HeadTable:
         due = self.glance_until is None and not self.on_face and self.now - self.quiet_since >= self.pace
         if there and (running or due):
             wants["glance"] = "human"
+        listens = self._listens(there)
         self.answers = {event: answer for event, answer in self.answers.items() if self.now < answer.until}
         if self.answers:
             wants["response"] = self.answers[max(self.answers)].target
+        elif listens:
+            wants["response"] = "human"
         if self.acting or (self.fast and self.now - self.fast_since >= TIMES["HAND_ONSET"]):
             self.followed = True
         elif not self.fast and self.now - self.still_since >= TIMES["HAND_STILLNESS"]:
@@ -116,6 +128,15 @@ class HeadTable:
             wants["hands"] = "hand"
         wants["face"] = "human" if there else ""
         return wants
+
+    def _listens(self, there: bool) -> bool:
+        if there and self.speaks_since is not None and self.now - self.speaks_since >= TIMES["ONSET"]:
+            self.listens_until = float("inf")
+        elif self.speaks_since is None and self.listens_until == float("inf"):
+            self.listens_until = self.now + TIMES["STAYS"]
+        if not there or (self.listens_until is not None and self.now >= self.listens_until):
+            self.listens_until = None
+        return self.listens_until is not None
 
     def ask(self) -> None:
         wants = self.rows()

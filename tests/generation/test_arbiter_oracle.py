@@ -6,9 +6,10 @@ from unittest import mock
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engage_hri.services.generation.head import arbiter, maintenance_policy, response_policy
+from engage_hri.schemas.recognition import Floor, FloorSpeech
+from engage_hri.services.generation.head import arbiter, listening_policy, maintenance_policy, response_policy
 from tests.generation.head_table import TICK, TIMES, HeadTable
-from tests.generation.heads import Stage, act, event, inhibition, statistics, world
+from tests.generation.heads import AT, Stage, act, event, inhibition, statistics, world
 from tests.random_cases import share_of
 
 
@@ -43,6 +44,12 @@ class Both:
         self.table.act(acting)
         self.table.ask()
         self.stage.feed(act(ends=not acting))
+
+    def speak(self, speaks: bool) -> None:
+        self.table.speak(speaks)
+        self.table.ask()
+        speeches = (FloorSpeech(actor="human", since=AT),) if speaks else ()
+        self.stage.feed(Floor(at=AT, speeches=speeches))
 
     def direct(self, target: str) -> None:
         self.table.direct(len(self.events), target)
@@ -89,6 +96,7 @@ HAPPENINGS = st.sampled_from(
         *[("hand", fast) for fast in (True, False)],
         *[("person", seen) for seen in (True, False)],
         *[("act", acting) for acting in (True, False)],
+        *[("speak", speaks) for speaks in (True, False)],
         *[("direct", target) for target in ("piece", "other", "human")],
         *[("decide", age, state) for age in (0, 1) for state in ("succeeded", "completed", "failed")],
         *[("inhibit", *lease) for lease in (("release", ""), ("hold", ""), ("target", "piece"), ("", ""))],
@@ -106,7 +114,7 @@ def test_whatever_happens_the_owner_and_the_shifts_are_those_of_the_table(
     story: list[tuple[tuple[object, ...], int]],
 ) -> None:
     with ExitStack() as changed:
-        for module in (arbiter, maintenance_policy, response_policy):
+        for module in (arbiter, listening_policy, maintenance_policy, response_policy):
             times = {name: seconds for name, seconds in TIMES.items() if hasattr(module, name)}
             changed.enter_context(mock.patch.multiple(module, **times))
         both = Both()

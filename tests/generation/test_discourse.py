@@ -73,25 +73,25 @@ def test_a_backchannel_is_no_turn() -> None:
 
 
 def test_somebody_else_has_heard_of_nothing() -> None:
-    named = NO_DISCOURSE.in_turn("t", "ann").naming("t", [A])
+    named = NO_DISCOURSE.in_turn("t", ("ann",)).naming("t", [A])
 
-    assert named.in_turn("u", "ann").topic == A
-    assert named.in_turn("u", "ben").topic == ""
+    assert named.in_turn("u", ("ann",)).topic == A
+    assert named.in_turn("u", ("ben",)).topic == ""
 
 
 def test_what_was_not_said_is_not_named() -> None:
-    named = NO_DISCOURSE.in_turn("t", "ann").naming("t", [A]).naming("u", [B])
+    named = NO_DISCOURSE.in_turn("t", ("ann",)).naming("t", [A]).naming("u", [B])
 
     assert named.topic == ""
     assert named.without("u", {B}).topic == A
     assert named.without("u", {A}) == named  # the other fragment's
-    assert named.in_turn("v", "ann").without("u", {B}).topic == A
+    assert named.in_turn("v", ("ann",)).without("u", {B}).topic == A
 
 
 def test_a_person_who_directs_to_something_else_changes_the_topic() -> None:
-    named = NO_DISCOURSE.in_turn("t", "ann").naming("t", [A])
+    named = NO_DISCOURSE.in_turn("t", ("ann",)).naming("t", [A])
 
-    assert named.hearing(directs(B), "robot") == Discourse("t", "ann")
+    assert named.hearing(directs(B), "robot") == Discourse("t", ("ann",))
     assert named.hearing(directs(A), "robot") == named
     assert named.hearing(directs(B, initiator="robot"), "robot") == named
     assert named.hearing(replace(directs(B), state="succeeded"), "robot") == named  # it began before

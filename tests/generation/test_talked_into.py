@@ -17,6 +17,11 @@ from engage_hri.services.runtime.service import running
 from tests.random_cases import share_of
 
 LONG = "Here I tell you a story that takes a while, of seven pieces, and of a cat that really wanted to be a boat."
+LONG_FRAGMENT = {
+    "id": "f",
+    "turn_status": "full",
+    "behaviors": [{"type": "speech", "id": "s", "text": LONG}],
+}
 ASKED = "Which one of them do you like best?"
 
 
@@ -92,6 +97,50 @@ async def test_words_decide_and_not_their_length(hub: MemoryHub, words: str, sec
         told = await performing
 
     assert told.status == ("interrupted" if stops else "done")
+
+
+@pytest.mark.parametrize(("words", "stops"), [("stop", True), ("uh-huh", False)])
+@pytest.mark.parametrize("index", [2, 3])
+async def test_words_decide_in_whichever_turn_of_the_robot(
+    hub: MemoryHub, words: str, index: int, *, stops: bool
+) -> None:
+    async with robot(hub) as client, perceive("ann", hub=hub) as ann:
+        await ann.look_at(ann.robot)
+        await asyncio.sleep(1.0)
+        await perform_call(client, call("Well,", turn_index=2))
+        performing = asyncio.create_task(perform_call(client, call(LONG, turn_index=index)))
+        await asyncio.sleep(1.5)
+        await ann.say(words, seconds=0.35)
+        told = await performing
+
+    assert told.status == ("interrupted" if stops else "done")
+    assert [(each.text, each.reading) for each in told.interjections] == [
+        (words, "interruption" if stops else "backchannel")
+    ]
+
+
+@pytest.mark.parametrize("first", ["held", "spoken into"])
+async def test_what_a_manager_holds_does_not_go_on_after_an_interjection(hub: MemoryHub, first: str) -> None:
+    async with robot(hub) as client, perceive("ann", hub=hub) as ann:
+        await ann.look_at(ann.robot)
+        await asyncio.sleep(1.0)
+        performing = asyncio.create_task(client.perform(LONG_FRAGMENT))
+        await asyncio.sleep(1.5)
+        if first == "held":
+            await client.hold("f")
+            await ann.say("uh-huh", seconds=0.5)
+        else:
+            saying = asyncio.create_task(ann.say("uh-huh", seconds=0.5))
+            await asyncio.sleep(0.2)
+            await client.hold("f")
+            await saying
+        await asyncio.sleep(12.0)
+        is_over = performing.done()
+        await client.resume("f")
+        told = await performing
+
+    assert not is_over
+    assert told.status == "done"
 
 
 @pytest.mark.parametrize(("seconds", "stops"), [(0.6, False), (1.2, True)])

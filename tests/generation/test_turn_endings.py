@@ -158,7 +158,8 @@ def test_what_somebody_else_says_neither_holds_nor_ends_the_turn() -> None:
     turns.interject(into("interruption", "passer-by"), 2.8)
 
     assert (turns.held, turns.tick(3.0)) == ("", None)
-    assert turns.interjections.of_turn("a") == ()
+    [into_it] = turns.interjections.of_turn("a")
+    assert (into_it.actor, into_it.held, into_it.went_on) == ("passer-by", 0.0, True)
 
 
 def test_what_was_said_into_one_turn_does_not_cut_the_next() -> None:

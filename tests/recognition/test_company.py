@@ -93,6 +93,41 @@ what the robot asks while it is not known to whom she speaks is told in its turn
     1 ann speaks 2; 2 robot asks ann 1; 2.5 ann looks bob; 20 end
     robot: started 2, failed 7
 
+of two who are asked one answers for both
+    1 robot asks ann,bob 2; 2 bob looks robot; 3.6 bob speaks 1; 20 end
+    robot: started 1, succeeded 3.6 after 0.6 by bob, completed 3.6 by bob
+    robot: started 1, succeeded 3.6 after 0.6 by bob, completed 4.6 by bob
+
+... with a nod, too
+    1 robot asks ann,bob 2; 2 bob looks robot; 3.6 bob nods 0.4; 20 end
+    robot: started 1, succeeded 3.6 after 0.6 by bob, completed 3.6 by bob
+    robot: started 1, succeeded 3.6 after 0.6 by bob, completed 4 by bob
+
+... who begins before the question is over
+    1 robot asks ann,bob 2; 2 bob looks robot; 2.8 bob speaks 1; 20 end
+    robot: started 1, succeeded 3 after -0.2 by bob, completed 3 by bob
+    robot: started 1, succeeded 3 after -0.2 by bob, completed 3.8 by bob
+
+... or interrupts it for good
+    1 robot asks ann,bob 2 cut=1; 2 bob looks robot; 2.2 bob speaks 2; 20 end
+    robot: started 1, succeeded 3 after -0.8 by bob, completed 3 by bob
+    robot: started 1, succeeded 3 after -0.8 by bob, completed 4.2 by bob
+
+if nobody answers, both have not
+    1 robot asks ann,bob 2; 20 end
+    robot: started 1, failed 7
+    robot: started 1, failed 7
+
+if both answer, each has
+    1 robot asks ann,bob 2; 2 ann looks robot; 2 bob looks robot; 2.8 ann speaks 1; 2.9 bob speaks 1; 20 end
+    robot: started 1, succeeded 3 after -0.2 by ann, completed 3.8 by ann
+    robot: started 1, succeeded 3 after -0.1 by bob, completed 3.9 by bob
+
+who was not asked answers for nobody
+    1 robot asks ann,bob 2; 2 cy looks robot; 3.6 cy speaks 1; 20 end
+    robot: started 1, preempted 3.6 after 0.6 by cy
+    robot: started 1, preempted 3.6 after 0.6 by cy
+
 a typed line is for the robot
     1 ann looks bob; 2 ann types hello; 20 end
     ann: started 2, failed 6
@@ -142,17 +177,17 @@ def _spelled_out(log: Log, steps: list[str]) -> Iterable[tuple[float, int, Any]]
                 worded = Worded(actor=who, since=float(since), text=named.get("words", "so").replace(",", " "), to=to)
                 yield at, number, lambda worded=worded, at=at: log.feed(worded, at)
             case ["asks", person, lasts]:
-                end, block = at + float(lasts), f"block-{number}"
-                yield (
-                    at,
-                    number,
-                    lambda at=at, b=block, p=person: log.feed(
-                        request_event("adjacency_pair", at, request=b, block=b, turn=b, responder=p), at
-                    ),
-                )
+                end, block, cut = at + float(lasts), f"block-{number}", "cut" in named
+                for one in person.split(","):
+                    asked = request_event(
+                        "adjacency_pair", at, request=f"{block}/{one}", block=block, turn=block, responder=one
+                    )
+                    yield at, number, lambda at=at, asked=asked: log.feed(asked, at)
                 yield at, number, lambda at=at, b=block: log.begins(ROBOT, "speak", at, behavior=f"{b}:s")
                 yield end, number, lambda end=end, b=block: log.ends(ROBOT, "speak", end, behavior=f"{b}:s")
-                signal = TurnSignal(id="e", turn=block, signal="ended", actor=person)
+                signal = TurnSignal(
+                    id="e", turn=block, signal="aborted" if cut else "ended", actor="" if "," in person else person
+                )
                 ended = SignalTurn(id=f"{block}/e", requester="realizer", signal=signal, at=stamp(end), block=block)
                 yield end, number, lambda ended=ended, end=end: log.feed(ended, end)
 

@@ -121,9 +121,9 @@ def recognized(story: Talk, *, with_words: bool = True) -> list[ConnectionEvent]
         asked = Event(kind="adjacency_pair", id="e", responder=who, turn=turn)
         over = TurnSignal(id="s", turn=turn, signal="ended", actor=who)
         steps += [
-            (began, 2, ActionBegan(actor=ROBOT, action="speak", at=stamp(began / 10), behavior=turn), began),
+            (began, 2, ActionBegan(actor=ROBOT, action="speak", at=stamp(began / 10), behavior=f"{turn}:s"), began),
             (began, 3, RequestEvent(id=turn, requester="r", block=turn, at=stamp(began / 10), event=asked), began),
-            (ended, 2, ActionEnded(actor=ROBOT, action="speak", at=stamp(ended / 10), behavior=turn), ended),
+            (ended, 2, ActionEnded(actor=ROBOT, action="speak", at=stamp(ended / 10), behavior=f"{turn}:s"), ended),
             (ended, 3, SignalTurn(id=f"{turn}-end", requester="r", signal=over, at=stamp(ended / 10)), ended),
         ]
     for each in story.messages if with_words else ():
@@ -183,11 +183,11 @@ def belongs(message: Message, speeches: list[Speech]) -> int | None:
 
 
 def lives(changes: list[ConnectionEvent]) -> list[list[ConnectionEvent]]:
-    """All changes of each event."""
+    """All changes of each event, by its id: in which order events are told of may depend on when words come."""
     found: dict[str, list[ConnectionEvent]] = {}
     for change in changes:
         found.setdefault(change.id, []).append(change)
-    return [*found.values()]
+    return [found[id] for id in sorted(found)]
 
 
 def expected_words(

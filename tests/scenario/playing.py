@@ -53,9 +53,16 @@ class Record:
         return dict(sorted(lives.items(), key=lambda it: it[1][0].started.seconds))
 
     def robot_initiated(self) -> list[ConnectionEvent]:
-        """For each event that the robot's turns and references caused, by start, the change that decided it."""
-        lives = [life for life in self.events.values() if life[0].initiator == "robot"]
-        return [life[min(1, len(life) - 1)] for life in lives if life[0].cause in ("turn", "reference")]
+        """For each event that the robot's turns and references asked for, by request, the change that decided it.
+
+        A request may have adopted an event of the person's: it names the block from the time of the request on.
+        """
+        asked = [
+            [change for change in life if change.block and change.cause in ("turn", "reference", "human")]
+            for life in self.events.values()
+        ]
+        asked = sorted(filter(None, asked), key=lambda life: life[0].at.seconds)
+        return [life[min(1 if life[0].state == "started" else 0, len(life) - 1)] for life in asked]
 
     @property
     def outcomes(self) -> dict[str, FragmentOutcome]:

@@ -37,7 +37,7 @@ def test_events_come_in_the_order_and_with_the_outcomes_of_the_transcript(
     record = seen(resolution, faults)
 
     assert by_step(record, resolution) == EXPECTED[resolution]
-    assert not [id for id in record.outcomes if "fix" in id or "again" in id]
+    assert not [id for id in record.outcomes if "fix" in id or "help" in id]
     assert {outcome.status for outcome in record.outcomes.values()} == {"done"}
 
 

@@ -147,6 +147,9 @@ def blocks(draw: st.DrawFn) -> Block:
     )
 
 
+people = st.just("") | st.just("*") | ids | st.lists(ids, min_size=2, max_size=3).map(tuple)
+
+
 @st.composite
 def fragments(draw: st.DrawFn) -> TurnFragment:
     made, constraints = draw(_inputs(in_fragment=True))
@@ -156,7 +159,9 @@ def fragments(draw: st.DrawFn) -> TurnFragment:
         turn_status=draw(st.sampled_from(get_args(TurnStatus))),
         behaviors=made,  # type: ignore[arg-type]
         constraints=constraints,
-        addressee=draw(words),
+        addressee=draw(people),
+        interruptible=draw(st.none() | st.booleans() | people.filter(bool)),
+        interruptible_after=draw(st.none() | st.floats(0.0, 10.0)),
         delay=draw(st.booleans()),
         delay_target=draw(words),
         accept=draw(actions),

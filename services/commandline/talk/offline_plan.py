@@ -65,7 +65,7 @@ async def _generated(things: Sequence[Thing], world: World, config: RobotConfig,
         motions = from_here_told(sequence, here, glanced)
         try:
             if not turn.backchannel:
-                discourse = discourse.in_turn(turn.turn, turn.addressee)
+                discourse = discourse.in_turn(turn.turn, turn.addressees)
             emitted = planned(
                 planning(
                     fragment,

@@ -1,4 +1,4 @@
-"""Courses over time: connection events, behaviors as planned and as measured, engagement, MTBCE, and delays. Pure.
+"""Courses over time: speeches, connection events, behaviors as planned and measured, engagement, MTBCE, delays. Pure.
 
 Instants are seconds of the clock that feeds them. What ended long ago is forgotten.
 """
@@ -6,13 +6,25 @@ Instants are seconds of the clock that feeds them. What ended long ago is forgot
 from collections import deque
 from collections.abc import Collection, Mapping
 
+from msgspec.structs import replace
+
 from engage_hri.schemas.blocks import BlockProgress, NetPlanned, PlannedPoint, PredictionFeedback, SyncPointProgress
+from engage_hri.schemas.messages import Message
 from engage_hri.schemas.participants import PeerAlive, PeerGone
-from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, EngagementLevel, EventState, Statistics
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.recognition import (
+    ENDINGS,
+    ConnectionEvent,
+    EngagementLevel,
+    EventState,
+    Floor,
+    Interjection,
+    Statistics,
+)
+from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.console.view import OWN_BLOCKS
 from engage_hri.services.console.web import sections
 from engage_hri.services.console.web.sections import Zero
+from engage_hri.services.console.wording import READINGS
 
 KEPT: Seconds = 90.0
 """Time for which what has ended is kept."""
@@ -64,6 +76,51 @@ class _Event:
             cause=event.cause, state=self.decision, optional=event.optional, delay=self.delay, limit=event.limit,
             since=zero(self.since), decided=_or_none(zero, self.decided), until=_or_none(zero, self.until),
         )  # fmt: skip
+
+
+class FloorLanes:
+    """Speeches that go on or ended lately, and what those into the robot's turns were taken for."""
+
+    def __init__(self) -> None:
+        self._speeches: dict[tuple[str, Stamp], sections.SpeechShown] = {}
+        """By who speaks, and since when: that is the name of a speech. Instants are local."""
+
+    def feed(self, message: Message, at: Seconds) -> bool:
+        """Take a message. at: its local instant. Returns whether it may change what is shown."""
+        known = self._speeches
+        match message:
+            case Floor(speeches=speeches):
+                going_on = {(each.actor, each.since): each for each in speeches}
+                for key, each in going_on.items():
+                    speech = known.get(key) or self._new(key, at, message.at)
+                    known[key] = replace(speech, to=each.to, until=None)
+                self._end(at, but=going_on)
+            case Interjection(actor=actor, since=since, reading=reading, words=words):
+                speech = known.get((actor, since)) or self._new((actor, since), at, message.at, until=at)
+                known[actor, since] = replace(speech, taken=READINGS[reading], words=words)
+            case PeerGone(participant="recognition"):
+                self._end(at, but=())
+            case _:
+                return False
+        old = [key for key, each in known.items() if each.until is not None and at - each.until > KEPT]
+        for key in (*old, *list(known)[: max(0, len(known) - MOST)]):
+            known.pop(key, None)
+        return True
+
+    @staticmethod
+    def _new(key: tuple[str, Stamp], at: Seconds, told: Stamp, until: Seconds | None = None) -> sections.SpeechShown:
+        actor, since = key
+        return sections.SpeechShown(actor, (), at - (told.seconds - since.seconds), until)
+
+    def _end(self, at: Seconds, but: Collection[tuple[str, Stamp]]) -> None:
+        for key, each in self._speeches.items():
+            if each.until is None and key not in but:
+                self._speeches[key] = replace(each, until=at)
+
+    def shown(self, zero: Zero) -> tuple[sections.SpeechShown, ...]:
+        """The speeches, in the order in which they were heard of."""
+        told = self._speeches.values()
+        return tuple(replace(each, since=zero(each.since), until=_or_none(zero, each.until)) for each in told)
 
 
 class BlockLanes:

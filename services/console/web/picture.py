@@ -36,7 +36,7 @@ from engage_hri.services.bus.deadlines import Acquaintances
 from engage_hri.services.console import nets, view, wording
 from engage_hri.services.console.web import scene
 from engage_hri.services.console.web.health import HealthBoard
-from engage_hri.services.console.web.lanes import BlockLanes, EventLanes, Measures
+from engage_hri.services.console.web.lanes import BlockLanes, EventLanes, FloorLanes, Measures
 from engage_hri.services.console.web.scene import plainly
 from engage_hri.services.console.web.sections import Choice, HeadSection, Note, Switched, UtteranceShown
 from engage_hri.services.console.web.turns import ShownTurns
@@ -62,6 +62,7 @@ class Picture:
         self._state: RobotState | None = None
         self._body: Capabilities | None = None
         self._head_since = began
+        self._floor = FloorLanes()
         self._events = EventLanes()
         self._blocks = BlockLanes()
         self._turns = ShownTurns()
@@ -79,6 +80,7 @@ class Picture:
             "scene": lambda: scene.section(self._scene, self._world, self._state, self._body),
             "words": self._words,
             "head": self._head,
+            "floor": lambda: self._floor.shown(self.zero),
             "events": lambda: self._events.shown(self.zero),
             "nets": lambda: list(self._nets),
             "tokens": lambda: [nets.tokens(net) for net in self._nets.values()],
@@ -188,6 +190,8 @@ class Picture:
         if self._scene.owner != before.owner:
             self._head_since = at
             self._changed("head")
+        if self._floor.feed(message, at):
+            self._changed("floor")
         is_news = self._turns.feed(message, at)
         if is_news or self._scene.said != before.said or self._scene.held != before.held:
             self._changed("words")

@@ -213,6 +213,7 @@ ANSWERED = {
     "mutual facial gaze": "{} looks at the robot",
     "adjacency pair": "{} spoke to the robot",
     "backchannel": "{} showed that they listen",
+    "speech": "it listens to {}",
 }
 """Reason of a response, by what it answers."""
 KEPT = {

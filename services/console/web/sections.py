@@ -159,6 +159,20 @@ class EventShown(Struct, frozen=True):
     until: Seconds | None
 
 
+class SpeechShown(Struct, frozen=True):
+    """A speech. to: ids of its addressees; empty: not known. until: None: it goes on.
+
+    taken: what it was taken for, in words, if it was said into the robot's turn: `as a listener`. words: of that.
+    """
+
+    actor: str
+    to: tuple[str, ...]
+    since: Seconds
+    until: Seconds | None
+    taken: str = ""
+    words: str = ""
+
+
 class SyncShown(Struct, frozen=True):
     """A sync point, in seconds of the picture. first: as planned at first. planned: as planned last."""
 

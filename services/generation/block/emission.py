@@ -5,7 +5,9 @@ their timing inline: the constraints that remain, but for the hold of a point un
 plain BML.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+import re
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import count, cycle, islice
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -20,6 +22,7 @@ from engage_hri.schemas.behaviors import (
     Gaze,
     Hand,
     Head,
+    Mark,
     Pointing,
     Reference,
     Speech,
@@ -30,6 +33,7 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
 from engage_hri.schemas.references import type_name
+from engage_hri.schemas.text import word_count
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.block.ordering import ordered
 from engage_hri.services.generation.block.parts import (
@@ -49,6 +53,11 @@ from engage_hri.services.generation.inhibitions import Permits
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation, Stroke, first_met, stroke
 from engage_hri.services.generation.turns.policy import TurnPlan
 
+_LOOKS = frozenset(("gaze", "gazeShift", "headDirectionShift", "locomotion"))
+"""Types of behaviors that turn the head elsewhere."""
+_PHRASE_END = re.compile(r"[.,;:!?…]+(?=\s+\w)|[。、！？，；：]+(?=\w)")
+PHRASE = 2.0
+"""Least number of words between two looks at addressees: a look takes about half a second. Ours."""
 FIGURE_LEAD: Seconds = 2.0
 """Time from gaze on target to the stroke of the point in profile figure-3.3: the figure's own."""
 
@@ -125,6 +134,8 @@ class Emission:
         self.last_gaze = self.last_glance = ""
         """Ids of the gaze before the end-of-turn gaze, if its timing leaves `relax` free, and of the last glance."""
         self.strokes: list[Stroke] = []
+        self.round = cycle((*turn.others, turn.addressee))
+        """Those at whom the robot looks next: it has looked at the one named first."""
 
     def plan(self) -> FragmentPlan:
         """Make the block; called once."""
@@ -133,8 +144,8 @@ class Emission:
                 self.constraints.append(rewritten)
         self._follow_the_turn()
         self._time_speeches_and_references()
-        opening, closing = self._opening(), self._closing()
-        behaviors = (*opening, *self._in_document_order(), *closing)
+        opening, around = self._opening(), self._looks_around()
+        behaviors = (*opening, *self._in_document_order(), *around, *self._closing())
         if self.turn.closes and self.speeches:
             behaviors = lowered(behaviors, self.speeches[-1])
         return FragmentPlan(
@@ -274,7 +285,7 @@ class Emission:
     def _glance(self, parts: Parts) -> Operator:
         parts.glance = self.names.fresh(f"{parts.reference.id}-glance")
         needs = self.needs[parts.reference.id]
-        parts.behaviors.append(Gaze(id=parts.glance, target=self.turn.addressee, needs=needs))
+        parts.behaviors.append(Gaze(id=parts.glance, target=next(self.round), needs=needs))
         return same(f"{parts.gaze}:relax", f"{parts.glance}:start")
 
     def _is_said(self, operator: Operator, inherited: Sequence[Operator]) -> bool:
@@ -312,10 +323,60 @@ class Emission:
     def _ends_with_gaze(self) -> bool:
         return self.turn.closes and self.permits.looks
 
-    def _event(self, id: str, kind: EventKind, start: str, needs: tuple[str, ...]) -> Event:
-        """An event of the turn. start: the sync point with which it begins; "": it begins with the block."""
+    def _looks_around(self) -> list[Gaze]:
+        """Looks at several addressees in turn, from one phrase to the next, if the fragment has no looks itself."""
+        has_looks = any(type_name(each) in _LOOKS for each in self.kept) or any(
+            each.gaze for each in self.parts.values()
+        )
+        if not self.turn.others or has_looks or not self.permits.looks:
+            return []
+        looks: list[Gaze] = []
+        for at in islice(self._gaps(), len(self.turn.addressees)):
+            look = Gaze(id=self.names.fresh("turn-look"), target=next(self.round), timing=(Timing("start", at),))
+            if looks:
+                self._tie(same(f"{looks[-1].id}:relax", f"{look.id}:start"))
+            looks.append(look)
+        if looks and self._ends_with_gaze:
+            self.last_gaze = looks[-1].id
+        elif looks:
+            self._tie(after(f"{self.speeches[-1]}:end", f"{looks[-1].id}:relax"))
+        return looks
+
+    def _gaps(self) -> Iterator[str]:
+        """Sync points between two phrases, each some words after the one before; marks are set if there are none."""
+        words = 0.0
+        for number, behavior in enumerate(self.kept):
+            if isinstance(behavior, Reference):
+                words += word_count(self.parts[behavior.id].made.words)
+            if not isinstance(behavior, Speech):
+                continue
+            if words >= PHRASE and behavior.id != self.speeches[0]:
+                yield f"{behavior.id}:start"
+                words = 0.0
+            begins = 0
+            for end in [] if behavior.markup else [found.end() for found in _PHRASE_END.finditer(behavior.text)]:
+                words += word_count(behavior.text[begins:end])
+                begins = end
+                if words >= PHRASE:
+                    taken = {each.id for each in behavior.marks}
+                    mark = next(id for n in count(1) if (id := f"look-{n}") not in taken)
+                    marks = sorted((*behavior.marks, Mark(mark, end)), key=lambda each: each.position)
+                    self.kept[number] = behavior = replace(behavior, marks=tuple(marks))
+                    yield f"{behavior.id}:{mark}"
+                    words = 0.0
+            words += word_count(behavior.text[begins:])
+
+    def _tie(self, operator: Operator) -> None:
+        self.constraints.append(Constraint(id=self.names.fresh("turn-looks"), operators=(operator,)))
+
+    def _event(self, id: str, kind: EventKind, start: str, needs: tuple[str, ...], responder: str = "") -> Event:
+        """An event of the turn. start: the sync point with which it begins; "": it begins with the block.
+
+        responder: "": the one named first.
+        """
         return Event(
-            id=self.names.fresh(id), kind=kind, responder=self.turn.addressee, cause="turn", turn=self.turn.turn,
+            id=self.names.fresh(id), kind=kind, responder=responder or self.turn.addressee, cause="turn",
+            turn=self.turn.turn,
             timing=(Timing("start", start),) if start else (), needs=needs,
         )  # fmt: skip
 
@@ -325,13 +386,13 @@ class Emission:
         start = f"{self.speeches[0]}:start" if self.speeches else ""
         needs = next((each.hinge for each in self.parts.values() if [*each.hinge] == self.speeches[:1]), ())
         if turn.announces_pair:
-            pair = self._event("turn-pair", "adjacency_pair", start, needs)
-            return [replace(pair, accept=turn.accept, limit=turn.within)]
+            pairs = [self._event("turn-pair", "adjacency_pair", start, needs, each) for each in turn.addressees]
+            return [replace(each, accept=turn.accept, limit=turn.within) for each in pairs]
         if turn.reply:
-            id = self.names.fresh(f"turn-{turn.reply}")
             timing = (Timing("start", start),) if start else ()
-            who = turn.addressee
-            return [TurnSignal(id=id, turn=turn.turn, signal=turn.reply, actor=who, timing=timing, needs=needs)]
+            signal = TurnSignal(id="", turn=turn.turn, signal=turn.reply, timing=timing, needs=needs)
+            name = f"turn-{turn.reply}"
+            return [replace(signal, id=self.names.fresh(name), actor=each) for each in turn.addressees]
         if turn.backchannel:
             nod = next((behavior.id for behavior in self.order if isinstance(behavior, Head)), "")
             if not start and nod and not self.permits.speech_only:
@@ -351,7 +412,8 @@ class Emission:
         if not turn.closes:
             return []
         ended = self.names.fresh("turn-ended")
-        signal = TurnSignal(id=ended, turn=turn.turn, signal="ended", actor=turn.addressee, needs=self.hinge)
+        actor = "" if turn.others else turn.addressee
+        signal = TurnSignal(id=ended, turn=turn.turn, signal="ended", actor=actor, needs=self.hinge)
         operators: list[Operator] = []
         closing: list[BlockBehavior] = []
         # A look of the author may go on when the words are over, or begin only then: the turn ends after it.

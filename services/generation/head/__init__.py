@@ -1,1 +1,1 @@
-"""Decides what the head looks at: claims of maintenance and response policy, inhibitions, and the arbiter of them."""
+"""Decides what the head looks at: its policies and inhibitions, each with a claim, and the arbiter of them."""

@@ -14,11 +14,12 @@ from engage_hri.schemas.behaviors import Event, GazeShift, Timing
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.fragments import Claim
-from engage_hri.schemas.recognition import ConnectionEvent, Statistics
+from engage_hri.schemas.recognition import ConnectionEvent, Floor, Statistics
 from engage_hri.schemas.units import Degrees, Radians, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import Acquaintances
 from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.head.listening_policy import ListeningPolicy
 from engage_hri.services.generation.head.maintenance_policy import FaceWatch, GlanceWatch, HandWatch, OfPeople
 from engage_hri.services.generation.head.response_policy import ResponsePolicy
 from engage_hri.services.generation.inhibitions import Inhibition
@@ -32,7 +33,7 @@ all the time. Ours."""
 NOBODY = Claim(kind="none", priority=0, reason="nobody has been seen")
 UP_RIGHT: Degrees = 60.0
 """Angle past the table: as far as the neck turns, at nothing that anybody could mean. Thesis 5.3."""
-Observation = World | RobotState | Statistics | ConnectionEvent | OfPeople
+Observation = World | RobotState | Statistics | ConnectionEvent | Floor | OfPeople
 
 
 class Aim(Struct, frozen=True):
@@ -91,6 +92,7 @@ class Arbiter:
     def __init__(self, robot: str, config: GenerationConfig) -> None:
         self._config = config
         self._responses = ResponsePolicy(robot)
+        self._listening = ListeningPolicy(robot)
         self._hands = HandWatch(robot)
         self._faces = FaceWatch(robot)
         self._glances = GlanceWatch(config)
@@ -130,7 +132,11 @@ class Arbiter:
                 self._glances.feed(observation, now)
                 if actor:
                     self._people.hear(actor, now)
+            case Floor():
+                if self._config.listens:
+                    self._listening.feed(observation, now)
             case ConnectionEvent():
+                self._listening.feed(observation, now)
                 self._glances.feed(observation, now)
                 self._responses.feed(
                     observation,
@@ -192,14 +198,15 @@ class Arbiter:
         self._base = NOWHERE
 
     def recognition_lost(self) -> None:
-        """Drop the claims of the response policy: their events will never be told to end."""
+        """Drop what recognition told: the ends of its events and speeches will never come."""
         self._responses.forget()
+        self._listening.forget()
 
     # -- what follows ---------------------------------------------------------------------------------------------
 
     @property
     def deadline(self) -> Seconds | None:
-        due = [self._hands.deadline, self._faces.deadline, self._glances.deadline, self._responses.deadline]
+        due = [each.deadline for each in (self._hands, self._faces, self._glances, self._responses, self._listening)]
         due.append(self._failed[1] if self._failed else None)
         if self._lapsed is not None:
             due.append(self._lapsed + DWELL)
@@ -234,9 +241,10 @@ class Arbiter:
     def _claims(self, now: Seconds) -> list[Claim]:
         face = self._faces.claim(now)
         self._glances.face = face.target if face else ""
+        listens = self._listening.claim(now, self._faces.present(now))
         claims = [
             self._inhibition.claim if self._inhibition else None, self._fragment or self._thought,
-            self._glances.claim(now), self._responses.claim(now), self._hands.claim(now), face,
+            self._glances.claim(now), self._responses.claim(now) or listens, self._hands.claim(now), face,
         ]  # fmt: skip
         return [claim for claim in claims if claim is not None]
 

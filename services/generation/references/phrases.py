@@ -35,19 +35,19 @@ class Named(Struct, frozen=True):
 
 
 class Discourse(Struct, frozen=True):
-    """The objects referred to. named: in the turn. before: in the turn before it. addressee: the person who heard."""
+    """The objects referred to. named: in the turn. before: in the turn before it. heard_by: those who heard."""
 
     turn: str = ""
-    addressee: str = ""
+    heard_by: tuple[str, ...] = ()
     named: tuple[Named, ...] = ()
     before: tuple[Named, ...] = ()
 
-    def in_turn(self, turn: str, addressee: str) -> "Discourse":
-        """The discourse at a fragment of `turn`. For another addressee nothing was referred to before."""
+    def in_turn(self, turn: str, addressees: tuple[str, ...]) -> "Discourse":
+        """The discourse at a fragment of `turn`. For who has not heard the turn before nothing was referred to."""
         if turn == self.turn:
             return self
-        before = self.named if addressee == self.addressee else ()
-        return Discourse(turn=turn, addressee=addressee, before=before)
+        before = self.named if {*addressees} <= {*self.heard_by} else ()
+        return Discourse(turn=turn, heard_by=addressees, before=before)
 
     def naming(self, fragment: str, objects: Collection[str]) -> "Discourse":
         """The discourse after a fragment that refers, or is going to refer, to `objects`."""

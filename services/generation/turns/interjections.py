@@ -13,18 +13,25 @@ UNDECIDED: Seconds = 3.0
 
 
 class _Kept(Struct):
-    """turn: the turn that it was said into. told: its last news. waits: the robot waits for its reading.
+    """turn: the turn that it was said into. told: its last news.
 
-    is_voiced: the voice goes on.
+    counts_from: when the robot heeds it if the voice goes on until then; None: it may not interrupt, or has fallen
+    silent before. is_heeded: the robot does. waits: it waits for the reading. is_voiced: the voice goes on.
     """
 
     turn: str
     told: Interjection
-    opened: Seconds
-    waits: bool = True
+    counts_from: Seconds | None
+    is_heeded: bool = False
+    waits: bool = False
     is_voiced: bool = True
     held: Seconds = 0.0
     went_on: bool = False
+
+    @property
+    def is_pending(self) -> bool:
+        """True if it is not heeded yet, and will be if it lasts."""
+        return self.counts_from is not None and self.is_voiced and not self.is_heeded
 
 
 class Interjections:
@@ -34,26 +41,49 @@ class Interjections:
         self._kept: dict[tuple[str, Stamp], _Kept] = {}
         """By person and beginning."""
 
-    def feed(self, told: Interjection, turn: str, now: Seconds) -> bool:
+    def feed(self, told: Interjection, turn: str, now: Seconds, *, after: Seconds | None) -> bool:
         """Take news of a speech. True: it takes the floor.
 
-        turn: id of the robot's turn that this person may interrupt now; "": there is none.
+        turn: id of the robot's turn now; "": there is none. after: how long this person has to speak to interrupt it;
+        None: the robot goes on, whatever is said.
         """
         kept = self._kept.get((told.actor, told.since))
         if kept is None:
             if turn and told.reading == "open":
-                self._kept[told.actor, told.since] = _Kept(turn, told, now)
+                self._kept[told.actor, told.since] = kept = _Kept(turn, told, None if after is None else now + after)
+                if after == 0.0:
+                    self._heed(kept)
             return False
         kept.told = told
-        if told.reading == "interruption" and kept.turn == turn:
-            self._release(kept, now, went_on=False)
-            return True
-        self._release(kept, now, went_on=True)
-        return False
+        takes_floor = told.reading == "interruption" and kept.turn == turn and kept.is_heeded
+        self._release(kept, now, went_on=not takes_floor)
+        if told.reading != "interruption":
+            kept.counts_from = None
+        return takes_floor
+
+    def _heed(self, kept: _Kept) -> None:
+        kept.is_heeded, kept.waits = True, kept.told.reading == "open"
+
+    def heed(self, actor: str, now: Seconds) -> bool:
+        """Heed what this person says, for it has lasted long enough. True: it takes the floor."""
+        takes_floor = False
+        for each in self._kept.values():
+            if each.told.actor == actor and each.is_pending and each.counts_from is not None:
+                each.counts_from = now
+                self._heed(each)
+                takes_floor = each.told.reading == "interruption"
+                each.went_on = not takes_floor and not each.waits
+        return takes_floor
+
+    def unheeded_in(self, turn: str) -> Mapping[str, Seconds]:
+        """People whose speech in this turn is heeded if it lasts, and from when on."""
+        pending = [each for each in self._kept.values() if each.turn == turn and each.is_pending]
+        return {each.told.actor: each.counts_from for each in pending if each.counts_from is not None}
 
     def _release(self, kept: _Kept, now: Seconds, *, went_on: bool) -> None:
         if kept.waits:
-            kept.waits, kept.held = False, now - kept.opened
+            assert kept.counts_from is not None
+            kept.waits, kept.held = False, now - kept.counts_from
         kept.went_on = went_on
 
     def falls_silent(self, actor: str) -> None:
@@ -65,15 +95,15 @@ class Interjections:
     def voiced_in(self, turn: str) -> Mapping[str, Seconds]:
         """People who go on with an undecided speech in this turn, and since when."""
         return {
-            each.told.actor: each.opened
+            each.told.actor: each.counts_from
             for each in self._kept.values()
-            if each.waits and each.is_voiced and each.turn == turn
+            if each.waits and each.is_voiced and each.turn == turn and each.counts_from is not None
         }
 
     def waits_in(self, turn: str) -> Mapping[str, Seconds]:
         """People whose speech in this turn is undecided, and since when."""
         waiting = [each for each in self._kept.values() if each.waits and each.turn == turn]
-        return {each.told.actor: each.opened for each in reversed(waiting)}
+        return {each.told.actor: each.counts_from for each in reversed(waiting) if each.counts_from is not None}
 
     def give_up(self, actor: str, now: Seconds) -> None:
         """Wait for the readings of this person's speeches no longer: nobody has told them in time."""
@@ -84,7 +114,7 @@ class Interjections:
     def turn_over(self, turn: str, now: Seconds, *, went_on: bool) -> None:
         """Wait for nothing of a turn that is over. went_on: it was performed to its end."""
         for each in self._kept.values():
-            if each.waits and each.turn == turn:
+            if each.turn == turn and (each.waits or not each.is_heeded):
                 self._release(each, now, went_on=went_on)
 
     def of_turn(self, turn: str) -> tuple[Interjected, ...]:

@@ -136,8 +136,8 @@ class TurnEvents:
         self._turn_of[block] = turn
 
     def feed(self, event: ConnectionEvent, now: Seconds) -> None:
-        # An event that is first heard of in a later state belongs to an earlier performance under the same id, unless a
-        # request of this one has adopted it (decision 0187).
+        # An event that is first heard of in a later state belongs to an earlier performance under the same id,
+        # unless a request of this one has adopted it (decision 0187).
         is_known = event.id in self._events
         is_adopted = event.state == "succeeded" and (event.cause == "human" or event.retold)
         if event.block in self._turn_of and (event.state == "started" or is_known or is_adopted):
@@ -166,7 +166,7 @@ class TurnEvents:
         return next((event for event in mine if event.behavior == behavior), None)
 
     def pairs(self, turn: str) -> tuple[ConnectionEvent, ...]:
-        """The adjacency pairs of a turn: one, unless it was performed before under the same id."""
+        """The adjacency pairs of a turn: one with each addressee, unless it was performed before under this id."""
         return tuple(event for event in self.of_turn(turn) if event.kind == "adjacency_pair")
 
     def open_pair(self, turn: str) -> ConnectionEvent | None:
@@ -185,6 +185,7 @@ class _Record(Struct):
     """A turn that is not closed. spoken: by fragment, in order of arrival. ended: time of its end so far."""
 
     addressee: str
+    others: tuple[str, ...]
     spoken: dict[str, tuple[SpokenText, ...]] = {}
     status: Literal["done", "aborted"] = "done"
     reason: str = ""
@@ -222,7 +223,7 @@ class TurnOutcomes:
             displaced = self._close(fragment)
             self._events.forget(self._records.keys())
         if not turn.backchannel:
-            self._records.setdefault(turn.turn, _Record(turn.addressee)).spoken[fragment] = ()
+            self._records.setdefault(turn.turn, _Record(turn.addressee, turn.others)).spoken[fragment] = ()
         return displaced
 
     def refuse(self, fragment: str, turn: TurnPlan) -> None:
@@ -265,6 +266,8 @@ class TurnOutcomes:
 
     def _words_due_at(self, pair: ConnectionEvent) -> Seconds:
         """Time until which the words of an answer are waited for; long ago: they are not."""
+        if pair.is_answered_by_another:
+            return float("-inf")
         person = pair.responder
         if pair.response == "speak" and self._heard.expects(person):
             if pair.state == "succeeded":
@@ -280,11 +283,14 @@ class TurnOutcomes:
         record = self._records.pop(turn)
         self._given_up.clear(turn)
         for pair in self._events.pairs(turn):
+            if pair.is_answered_by_another:
+                continue
             if pair.state == "completed" and pair.response == "speak" and not pair.words:
                 self._heard.missed(pair.responder)
         return TurnClosed(
             turn=turn,
             addressee=record.addressee,
+            others=record.others,
             status=record.status,
             reason=record.reason,
             fragments=tuple(record.spoken),

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.fragments import TurnFragment, TurnStatus
+from engage_hri.schemas.fragments import EVERYBODY, TurnFragment, TurnStatus, ids_in
 from engage_hri.schemas.recognition import Interjection
 from engage_hri.schemas.requests import are_of_one_run
 from engage_hri.schemas.units import Seconds
@@ -46,10 +46,17 @@ TABLE: dict[TurnStatus, StatusRule] = {
 
 
 class TurnPlan(Struct, frozen=True, kw_only=True):
-    """The behavior that a fragment adds. turn: id of the fragment that opened the turn; its own for a backchannel."""
+    """The behavior that a fragment adds. turn: id of the fragment that opened the turn; its own for a backchannel.
+
+    addressee: of several the one named first. others: the others. interruptible, interruptible_after: as in the
+    fragment.
+    """
 
     turn: str
     addressee: str
+    others: tuple[str, ...] = ()
+    interruptible: bool | str | tuple[str, ...] | None = None
+    interruptible_after: Seconds | None = None
     accept: tuple[Action, ...] = ()
     within: Seconds | None = None
     announces_pair: bool = False
@@ -57,6 +64,19 @@ class TurnPlan(Struct, frozen=True, kw_only=True):
     """Message of a second or third turn, which starts no pair: tells recognition what became of the pending one."""
     closes: bool = False
     backchannel: bool = False
+
+    @property
+    def addressees(self) -> tuple[str, ...]:
+        return (self.addressee, *self.others)
+
+    def gives_way_after(self, actor: str) -> Seconds | None:
+        """Seconds for which this person has to speak to interrupt it; None: however long, it goes on."""
+        named = self.interruptible
+        if isinstance(named, str | tuple):
+            may = not {actor, EVERYBODY}.isdisjoint(ids_in(named))
+        else:
+            may = named is not False and actor in self.addressees
+        return (self.interruptible_after or 0.0) if may else None
 
 
 _COMPLETE = Fault(reason="")
@@ -73,14 +93,19 @@ class Aborted(Struct, frozen=True):
     fragments: tuple[str, ...]
     why: Fault
     is_known: bool = False
+    is_to_one: bool = True
 
 
-def plan_turn(fragment: TurnFragment, turn: str, addressee: str) -> TurnPlan:
+def plan_turn(fragment: TurnFragment, turn: str, addressee: str | tuple[str, ...]) -> TurnPlan:
     """Apply Table 3.1 to a legal fragment of turn `turn`."""
     rule = TABLE[fragment.turn_status]
+    first, *others = ids_in(addressee) or ("",)
     return TurnPlan(
         turn=turn,
-        addressee=addressee,
+        addressee=first,
+        others=tuple(others),
+        interruptible=fragment.interruptible,
+        interruptible_after=fragment.interruptible_after,
         accept=fragment.accept,
         within=fragment.within,
         announces_pair=rule.opens and fragment.turn_index == 1,
@@ -140,10 +165,12 @@ class TurnPolicy:
             return None
         return self._abort(self._open, Fault(reason=f"{requester} was restarted", cause="restarted", whose=requester))
 
-    def accept(self, fragment: TurnFragment, addressee: str, requester: str = "", life: str = "") -> TurnPlan:
+    def accept(
+        self, fragment: TurnFragment, addressee: str | tuple[str, ...], requester: str = "", life: str = ""
+    ) -> TurnPlan:
         """Take a fragment into the conversation. Raises InputRefused, and changes nothing, where it is illegal.
 
-        addressee: may be empty for the rest of a turn. requester, life: of the client that sends it.
+        addressee: one or several; may be empty for the rest of a turn. requester, life: of the client that sends it.
         """
         status = fragment.turn_status
         if fragment.id in {*self._live, *(plan.turn for plan in self._live.values()), self.open_turn}:
@@ -161,9 +188,10 @@ class TurnPolicy:
             if requester != self._speaker:
                 reason = f"turn {turn} is spoken by {self._speaker}, not by {requester}"
                 raise _illegal(fragment, "turn_status", reason, "begin a turn of your own once that one is over")
-            addressee = addressee or self._open.addressee
-            if addressee != self._open.addressee:
-                reason = f"turn {turn} speaks to {self._open.addressee}, not to {addressee}"
+            people = self._open.addressees
+            addressee = addressee or people
+            if {*ids_in(addressee)} != {*people}:
+                reason = f"turn {turn} speaks to {', '.join(people)}, not to {', '.join(ids_in(addressee))}"
                 raise _illegal(fragment, "addressee", reason, "end the turn first")
         else:
             if status == "backchannel" and self.holds_the_turn:
@@ -174,6 +202,11 @@ class TurnPolicy:
                 raise _illegal(fragment, "turn_status", reason, "send its 'end' first")
             turn = fragment.id
         plan = plan_turn(fragment, turn, addressee)
+        if self._open is not None:
+            if plan.interruptible is None:
+                plan = replace(plan, interruptible=self._open.interruptible)
+            if plan.interruptible_after is None:
+                plan = replace(plan, interruptible_after=self._open.interruptible_after)
         self._live[fragment.id] = plan
         self._delay_target = fragment.delay_target if fragment.delay else ""
         if status == "beginning":
@@ -235,8 +268,9 @@ class TurnPolicy:
     def interject(self, told: Interjection, now: Seconds) -> None:
         """Note what somebody says into the robot's turn, or that recognition has decided what it is."""
         current = self._current
-        is_let = current is not None and current.turn in self._begun and current.addressee == told.actor
-        if self.interjections.feed(told, current.turn if current is not None and is_let else "", now):
+        if current is None or current.turn not in self._begun:
+            self.interjections.feed(told, "", now, after=None)
+        elif self.interjections.feed(told, current.turn, now, after=current.gives_way_after(told.actor)):
             self._taken_by = told.actor
 
     @property
@@ -251,8 +285,8 @@ class TurnPolicy:
 
     def see(self, people: Collection[str], now: Seconds) -> None:
         """Note who is in sight."""
-        addressees = {plan.addressee for plan in self._turns_under_way} - {*people}
-        self._away = {actor: self._away.get(actor, now) for actor in addressees}
+        away = {actor for plan in self._turns_under_way for actor in plan.addressees} - {*people}
+        self._away = {actor: self._away.get(actor, now) for actor in away}
 
     @property
     def _turns_under_way(self) -> tuple[TurnPlan, ...]:
@@ -260,17 +294,27 @@ class TurnPolicy:
 
     @property
     def _limits(self) -> dict[tuple[str, str], Seconds]:
-        """Times until which others may go on as they do: be away or undecided, by person, and be silent, by turn."""
+        """Times until which others may go on as they do: be away or undecided, by person, and be silent, by turn.
+
+        Of a turn to several people one has to stay.
+        """
         turn = self._current.turn if self._current is not None else ""
         waiting = self.interjections.waits_in(turn)
         limits = {("undecided", actor): opened + UNDECIDED for actor, opened in waiting.items()}
+        limits |= {("counts", actor): at for actor, at in self.interjections.unheeded_in(turn).items()}
         if self._barge_in is not None:
             voiced = self.interjections.voiced_in(turn)
             limits |= {("talks", actor): opened + self._barge_in for actor, opened in voiced.items()}
         if self._silent_since is not None:
             limits["silent", self.open_turn] = self._silent_since + TURN_SILENCE
-        people = {plan.addressee for plan in self._turns_under_way}
-        return limits | {("away", each): at + FACE_GRACE for each, at in self._away.items() if each in people}
+        return limits | {("away", who): self._away[who] + FACE_GRACE for who, _ in self._left_alone}
+
+    @property
+    def _left_alone(self) -> Iterator[tuple[str, TurnPlan]]:
+        """Turns all of whose addressees are out of sight, each with the one that was there last."""
+        for plan in self._turns_under_way:
+            if self._away.keys() >= {*plan.addressees}:
+                yield max(plan.addressees, key=lambda each: self._away[each]), plan
 
     @property
     def deadline(self) -> Seconds | None:
@@ -284,11 +328,14 @@ class TurnPolicy:
         for name, at in limits.items():
             self._waits.keep(name, at, now)
         why, who = self._waits.due(now) or ("", "")
-        while why == "undecided":
-            self.interjections.give_up(who, now)
+        while why in ("undecided", "counts"):
+            if why == "undecided":
+                self.interjections.give_up(who, now)
+            elif self.interjections.heed(who, now):
+                self._taken_by = who
             why, who = self._waits.due(now) or ("", "")
         if why == "away":
-            left = next(plan for plan in self._turns_under_way if plan.addressee == who)
+            left = next(plan for last, plan in self._left_alone if last == who)
             return self._abort(left, self._sight.fault(f"{who} has left", "", "gone", who, "", self._away[who]))
         if why == "silent":
             assert self._open is not None
@@ -310,7 +357,7 @@ class TurnPolicy:
             del self._live[id]
         is_known = self._begun.get(plan.turn) is False
         self._forget()
-        return Aborted(plan.turn, plan.addressee, ended, why, is_known)
+        return Aborted(plan.turn, plan.addressee, ended, why, is_known, is_to_one=not plan.others)
 
     def _forget(self) -> None:
         """Drop what is known of turns that are over."""

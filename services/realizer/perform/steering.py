@@ -29,15 +29,25 @@ class Holds:
 
     def __init__(self) -> None:
         self._since: dict[Named, Seconds] = {}
+        self._holders: dict[Named, set[str]] = {}
+        """Those who have asked for each hold."""
 
-    def hold(self, block: str, behavior: str, now: Seconds) -> None:
-        """Hold it from now on, if it is not held already."""
+    def hold(self, block: str, behavior: str, now: Seconds, by: str = "") -> None:
+        """Hold it from now on, if it is not held already. by: who asks for it."""
         self._since.setdefault((block, behavior), now)
+        self._holders.setdefault((block, behavior), set()).add(by)
 
-    def let_go(self, block: str, behavior: str) -> None:
-        """Let go what this names, and all that is part of it."""
+    def let_go(self, block: str, behavior: str, by: str | None = None) -> None:
+        """Let go what this names, and all that is part of it. by: only what nobody else has asked for; None: all."""
         for held in [each for each in self._since if _is_part(each, (block, behavior))]:
-            del self._since[held]
+            if by is None or not self._holders[held] - {by}:
+                del self._since[held], self._holders[held]
+            else:
+                self._holders[held].discard(by)
+
+    def holds(self, block: str, behavior: str) -> bool:
+        """True if this itself is held, and not only something around it."""
+        return (block, behavior) in self._since
 
     def of_block(self, block: str) -> frozenset[str] | None:
         """Behaviors of the block that are held; None: all."""
@@ -115,14 +125,17 @@ class Steering:
             self._desk.accept(request.id)
             match request.to:
                 case "hold":
-                    self._holds.hold(block, behavior, self._bus.now())
+                    self._holds.hold(block, behavior, self._bus.now(), request.requester)
                 case "continue":
-                    self._holds.let_go(block, behavior)
+                    is_own = isinstance(request, SteerPerformance) and request.own
+                    self._holds.let_go(block, behavior, request.requester if is_own else None)
                 case "stop":
                     self._holds.let_go(block, behavior)
                     await self._stop(concerned, behavior, "" if behavior else ON_REQUEST, request.requester)
             self._apply()
             around = self._holds.around(block, behavior) if request.to == "continue" else None
+            if around is None and request.to == "continue" and self._holds.holds(block, behavior):
+                around = block, behavior
             if around is None:
                 self._desk.end(PerformanceSteered(id=request.id, blocks=tuple(live.id for live in concerned)))
             else:

@@ -29,6 +29,7 @@ TABLE = table(
     TransitionRow(ROBOT_WAITING, "responder_interrupts", INTERRUPTED),
     TransitionRow(ROBOT_WAITING, "human_answers", RESPONDING, ("succeeded",)),
     TransitionRow(ROBOT_WAITING, "other_answers", IDLE, ("preempted",)),
+    TransitionRow(ROBOT_WAITING, "one_of_several_answers", IDLE, ("succeeded", "completed")),
     TransitionRow(ROBOT_WAITING, "repaired", IDLE, ("succeeded", "completed")),
     TransitionRow(ROBOT_WAITING, "limit", IDLE, ("failed",)),
     TransitionRow(ROBOT_WAITING, "withdraw", IDLE, ("withdrawn",)),
@@ -79,6 +80,11 @@ class AdjacencyPair(Machine):
     def robot_holds_turn(self) -> bool:
         """True from the beginning of the robot's first turn to its end, pauses in its speech included."""
         return self._by_robot and self._turn_end is None and self.state in (ROBOT_WAITING, INTERRUPTED)
+
+    @property
+    def is_interrupted(self) -> bool:
+        """True if the first turn, which goes on, has been answered."""
+        return self.state == INTERRUPTED
 
     @property
     def deadline(self) -> Seconds | None:
@@ -147,6 +153,12 @@ class AdjacencyPair(Machine):
         self._by_robot = by_robot
         self._turn_end = self._last_heard = self._response_until = None
 
+    def resume(self, event: OngoingEvent, at: Seconds, *, by_robot: bool) -> None:
+        """Begin a pair that a former life of recognition has told, and whose first turn is over by now."""
+        self._open(event, by_robot=by_robot)
+        self.step("robot_asks" if by_robot else "human_asks", event.started)
+        self.turn_ends(at)
+
     def is_turn(self, turn: str) -> bool:
         """True if `turn` (empty: any) is the robot's turn with which this pair began."""
         return self.event is not None and self._by_robot and turn in ("", self.event.turn)
@@ -203,6 +215,15 @@ class AdjacencyPair(Machine):
             self.event.response, self.event.answered_by = action, person
             self.event.delay = at - self.question.since
             self.step("other_answers", at)
+
+    def answered_for_all(self, answered: OngoingEvent, at: Seconds) -> None:
+        """Take what has answered the robot's question to several people: it answers for each of them."""
+        event = self.event
+        if event is None or event is answered or not self.is_turn(answered.turn) or self.state != ROBOT_WAITING:
+            return
+        event.response, event.answered_by, event.delay = answered.response, answered.answered_by, answered.delay
+        is_asked = answered.answered_by == answered.responder
+        self.step("one_of_several_answers" if is_asked else "other_answers", at)
 
     # -- second turn --------------------------------------------------------------------------------------------
 

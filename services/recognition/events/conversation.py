@@ -66,6 +66,8 @@ class Conversation:
     @property
     def deadlines(self) -> tuple[Seconds | None, ...]:
         """Times of the `timed_steps`."""
+        if self.pair.event is None and self._sign is None and self.robot_backchannel.event is None:
+            return ()
         return self._sign_deadline, self.robot_backchannel.deadline, self._pair_deadline
 
     @property
@@ -79,7 +81,9 @@ class Conversation:
     def _pair_deadline(self) -> Seconds | None:
         """Deadline of the pair; None while speech of anybody that began in time may yet turn out to be the answer."""
         at, speeches = self.pair.deadline, self._sign.speeches if self._sign is not None else []
-        began_in_time = at is not None and any(in_time(speech.since, at) for speech in speeches)
+        if at is None:
+            return None
+        began_in_time = any(in_time(speech.since, at) for speech in speeches)
         if began_in_time and self.pair.may_be_answered_with("speak"):
             return None
         question = self.pair.question
@@ -110,6 +114,12 @@ class Conversation:
     def holds_floor(self) -> bool:
         return self.speaks_since is not None
 
+    @property
+    def is_under_way(self) -> bool:
+        """True if one holds the floor, or a pair, a sign or a backchannel is open."""
+        is_open = self.pair.event is not None or self.robot_backchannel.event is not None or self._cut_into
+        return self.robot_speaks_now or self.holds_floor or self._sign is not None or bool(is_open)
+
     def speaks(self, at: Seconds, confidence: Probability = 1.0) -> None:
         if self.speaks_since is not None:
             return
@@ -121,6 +131,10 @@ class Conversation:
             self._signs("speak", at, confidence)
         else:
             if self.robot_holds_floor:
+                self._writer.interject(self.id, at, "interruption", at)
+            elif (said := self._scene.robot_spoken) is not None and said.since <= at:
+                # Said to the robot while it speaks to others: it has no other reading.
+                self._writer.interject(self.id, at, "open", at)
                 self._writer.interject(self.id, at, "interruption", at)
             self._human_turn(at, "speak", confidence)
 
@@ -168,7 +182,7 @@ class Conversation:
     @property
     def _is_worded(self) -> bool:
         """True if words of what the person says now may come, and would decide what it is."""
-        return self.pair.robot_holds_turn and self.id in self._scene.worded
+        return self.robot_holds_floor and self.id in self._scene.worded
 
     def _sign_is_due(self, at: Seconds) -> None:
         """Decide the sign: its speech has become too long for a backchannel, or its words have not come."""
@@ -251,10 +265,14 @@ class Conversation:
 
     def _listens(self, since: Seconds) -> bool | None:
         """True if the words of a speech are a listener's; None: they are unknown, or not said to the robot's turn."""
-        words, pair = self._writer.text_of(self.id, since), self.pair
-        if not has_words(words) or not pair.robot_holds_turn or pair.event is None or since < pair.event.started:
+        words, event = self._writer.text_of(self.id, since), self.pair.event
+        if not has_words(words) or not self.robot_holds_floor or (event is not None and since < event.started):
             return None
         return is_listening(words)
+
+    def resumes(self, event: OngoingEvent, at: Seconds) -> None:
+        """Go on with a pair of a former life of recognition."""
+        self.pair.resume(event, at, by_robot=event.responder == self.id)
 
     def manipulates(self, at: Seconds, confidence: Probability = 1.0) -> None:
         self._human_turn(at, "act", confidence)
@@ -347,6 +365,7 @@ class Conversation:
         """Turn undecided speech that outlasts the other's turn into a turn of its own."""
         if not self.robot_holds_floor:
             self._keep_floor(at)
+            self._brief = None
         if self.robot_backchannel.state == UNDECIDED and not self.holds_floor:
             self._robot_takes_floor(at, "outlasts_turn")
 

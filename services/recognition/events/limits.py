@@ -60,7 +60,9 @@ class Blocks:
     def realised(self, block: str, behavior: str, sync: str, at: Seconds) -> str:
         """Remember a point. Returns its name, `behavior:sync`."""
         name = _name(behavior, sync)
-        self._points[block] = {**self._points.get(block, {}), name: at}
+        points = self._points.get(block, {})
+        points[name] = at
+        self._points[block] = points
         return name
 
     def point(self, block: str, name: str) -> Seconds | None:
@@ -84,6 +86,7 @@ class LimitClock:
 
     @property
     def waiting(self) -> tuple[str, ...]:
+        """Names of the anchors that have not come."""
         return tuple(self._waiting)
 
     @property

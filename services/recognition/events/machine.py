@@ -100,9 +100,13 @@ class OngoingEvent(Struct, kw_only=True):
     duration: Seconds | None = None
     response: Action | None = None
     answered_by: str = ""
+    is_to_several: bool = False
+    """Adjacency pair: the robot has asked others in the same turn, and whoever answers first answers for all."""
     confidence: Probability = 1.0
     """Least confidence of the observations on which the event rests."""
     changed: Seconds | None = None
+    is_former: bool = False
+    """True if a former life of recognition has told its start already. Its delay is not known."""
     spoken: tuple[Seconds, ...] = ()
     """Starts of the person's speeches that it consists of: its words are theirs."""
 
@@ -130,6 +134,8 @@ class EventWriter:
         """Words of speeches, by person and start."""
         self._spoken: Latest[str, tuple[OngoingEvent, ConnectionEvent]] = Latest(TEXTS_KEPT)
         """Events with speech of a person, each as it was last told."""
+        self.answered: list[tuple[OngoingEvent, Seconds]] = []
+        """Questions to several people that have just been answered by one of them, or by somebody else, and when."""
 
     def take(self) -> list[Effect]:
         """Return the effects since the last call."""
@@ -151,19 +157,26 @@ class EventWriter:
         if state == "failed" and not retold:
             event.delay = at - event.started
         begins, ends = state == "started", state == "completed"
+        if event.is_to_several and event.response is not None and not begins:
+            event.answered_by = event.answered_by or event.responder
+            if state in ("succeeded", "preempted"):
+                self.answered.append((event, at))
+        knows_delay = not begins and (state == "failed" or not event.is_former)
         told = ConnectionEvent(
                 id=event.id, kind=event.kind, initiator=event.initiator, responder=event.responder, state=state,
                 at=self.stamp(at), started=self.stamp(event.started), objects=event.objects, cause=event.cause,
-                optional=event.optional, delay=None if begins else event.delay,
+                optional=event.optional, delay=event.delay if knows_delay else None,
                 duration=event.duration if ends else None, limit=event.limit if begins else None,
                 response=None if begins else event.response, answered_by=event.answered_by,
                 confidence=event.confidence, block=event.block, behavior=event.behavior, turn=event.turn,
-                words=self._words_of(event), retold=retold,
+                words=self._words_of(event),
+                retold=retold or (begins and event.is_former),
         )  # fmt: skip
         self.effects.append(told)
         if event.spoken:
             self._spoken[event.id] = (event, told)
-        self._forget_spoken(at)
+        if self._spoken:
+            self._forget_spoken(at)
         if state in ENDINGS:
             self._open.pop(event.id, None)
         else:
@@ -211,6 +224,8 @@ class EventWriter:
             del self._spoken[id]
 
     def _words_of(self, event: OngoingEvent) -> str:
+        if not event.spoken:
+            return ""
         pair = (event.initiator, event.responder)
         texts = (self._texts.get((actor, speech), "") for speech in event.spoken for actor in pair)
         return " ".join(filter(None, texts))

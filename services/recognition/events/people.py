@@ -11,7 +11,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import FORGOTTEN_AFTER, Deadlines
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.machine import EventWriter, Mishap, PersonForgotten
+from engage_hri.services.recognition.events.machine import EventWriter, Mishap, OngoingEvent, PersonForgotten
 from engage_hri.services.recognition.events.person import PersonRecognition
 from engage_hri.services.recognition.events.scene import SessionScene, TakenUp
 
@@ -23,7 +23,8 @@ class People:
         self.persons: dict[str, PersonRecognition] = {}
         self._here: dict[str, PersonRecognition] = {}
         """Persons who are here, in the order of acquaintance."""
-        self._agenda: Deadlines[str] = Deadlines(lambda id: self.persons[id].number)
+        self.agenda: Deadlines[str] = Deadlines(lambda id: self.persons[id].number)
+        """Times at which the persons are due."""
         self._unseen: dict[str, Seconds] = {}
         """Time of the last sign of each person who has gone or is not reported as present. The longest ago first."""
         self._met = 0
@@ -32,8 +33,8 @@ class People:
         """`scene.unknown` and `scene.asked` when the deadlines of those who were asked were last updated."""
         self.touched: set[str] = set()
         """Persons whose contact with the robot may have changed since somebody emptied this."""
-        self._speech = 0
-        """`scene.speech` when the deadlines of all were last updated."""
+        self._silences = 0
+        """`scene.silences` when the deadlines of all were last updated."""
         self._scene = scene
         self._config = config
         self._writer = writer
@@ -53,13 +54,13 @@ class People:
     def see(self, world: World, at: Seconds) -> None:
         """Take a view of the world: people in it are here, those that are missing now may have gone."""
         before = self._scene.people_in_world
-        self._scene.see(world, at)
+        is_news = self._scene.see(world, at)
         self._scene.forget_others(at - FORGOTTEN_AFTER)
-        for id in sorted(self._scene.people_in_world):
-            self.person(id)
-        for id in sorted(before ^ self._scene.people_in_world):
-            self._note(self.persons[id], at)
-        self.apply_to_all(at, lambda person: None)  # an entity may have become known as an object
+        if before != self._scene.people_in_world:
+            for person in [self.person(id) for id in sorted(before ^ self._scene.people_in_world)]:
+                self._note(person, at)
+        if is_news:
+            self._looks_may_direct(at)
 
     def _note(self, person: PersonRecognition, at: Seconds) -> None:
         """Note a sign of the person, or its leaving, at `at`."""
@@ -78,13 +79,13 @@ class People:
             if person.presence.here:
                 person.presence.vanish(since)
                 self._apply(person, now, lambda person: person.leave(now))
-            self._agenda.clear(id)
+            self.agenda.clear(id)
             self._here.pop(id, None)
             self._scene.forget_person(id)
             self.touched.discard(id)
             del self.persons[id], self._unseen[id]
             self._writer.effects.append(PersonForgotten(id))
-            self._follow_speech(now)
+            self._follow(now)
 
     def lose_track(self, person: PersonRecognition, at: Seconds) -> None:
         """Begin anew with a person: its open events end as lost, and its actions have to be observed again."""
@@ -96,18 +97,13 @@ class People:
         self._writer.lose(person.id, at)
         self._scene.stops(person.id, at)
         self._update(fresh)
-        self._follow_speech(at)
+        self._follow(at)
 
     # -- steps ---------------------------------------------------------------------------------------------
 
-    @property
-    def deadline(self) -> Seconds | None:
-        """Time at which the first person is due."""
-        return self._agenda.earliest
-
     def advance(self) -> None:
         """Take the step that is due first."""
-        id, at = self._agenda.first, self._agenda.earliest
+        id, at = self.agenda.first, self.agenda.earliest
         assert id is not None
         assert at is not None
         self.apply(id, at, lambda person: person.pass_time(at))
@@ -122,41 +118,56 @@ class People:
     def apply(self, id: str, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
         """Apply a step to one person."""
         self._apply(self.persons[id], at, step)
-        self._follow_answers(at)
-        self._follow_speech(at)
+        self._follow(at)
 
-    def apply_to_all(self, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
-        """Apply a step to all who are here."""
-        self._speech = self._scene.speech
-        for person in list(self._here.values()):
+    def apply_to_all(
+        self,
+        at: Seconds,
+        step: Callable[[PersonRecognition], object],
+        where: Callable[[PersonRecognition], object] = lambda person: True,
+    ) -> None:
+        """Apply a step to all who are here. where: tells for whom it may change something."""
+        for person in [person for person in self._here.values() if where(person)]:
             self._apply(person, at, step)
-        self._follow_answers(at)
-        self._follow_speech(at)
+        self._follow(at)
 
-    def _follow_answers(self, at: Seconds) -> None:
-        """Tell those who were asked that somebody else has answered in their place, or may yet do so.
+    def _follow(self, at: Seconds) -> None:
+        """Tell the others what follows for them from a step.
 
-        Also let go on what has waited until it is known to whom somebody else speaks, the earliest first.
+        Those who were asked are told that somebody else has answered in their place, or may yet do so. What has
+        waited until it is known to whom somebody else speaks goes on, the earliest first. And all are told that
+        others are silent: while one speaks, looks of all but that one direct nothing.
         """
+        scene = self._scene
         self._tell_taken_up(at)
-        while (self._unknown, self._asked) != (self._scene.unknown, self._scene.asked):
-            self._unknown, self._asked = {**self._scene.unknown}, {*self._scene.asked}
-            for id in [*self._scene.questions]:
+        while (self._unknown, self._asked) != (scene.unknown, scene.asked):
+            self._unknown, self._asked = {**scene.unknown}, {*scene.asked}
+            for id in [*scene.questions]:
                 self._update(self.persons[id])
             for id in sorted(self._unknown, key=lambda id: (self._unknown[id], id)):
                 self._apply(self.persons[id], at, lambda person: person.talk.go_on(at))
                 self._tell_taken_up(at)
+        if self._silences != scene.silences:
+            self._silences = scene.silences
+            self._looks_may_direct(at)
 
     def _tell_taken_up(self, at: Seconds) -> None:
-        while self._scene.taken_up:
-            taken_up = self._scene.taken_up.pop()
+        """Tell those who were asked that somebody else has answered in their place, or for all who were asked."""
+        scene = self._scene
+        while scene.taken_up:
+            taken_up = scene.taken_up.pop()
             if taken_up.asked in self.persons:
                 self._apply(self.persons[taken_up.asked], at, partial(_answered_by_other, taken_up))
+        while self._writer.answered:
+            told = partial(_answered_for_all, *self._writer.answered.pop())
+            for person in list(self._here.values()):
+                self._apply(person, at, told)
 
-    def _follow_speech(self, at: Seconds) -> None:
-        """Update all deadlines if speech has begun or ended: while one speaks, looks of the others direct nothing."""
-        if self._speech != self._scene.speech:
-            self.apply_to_all(at, lambda person: None)
+    def _looks_may_direct(self, at: Seconds) -> None:
+        """Update the deadlines of those whose looks may direct the robot's now, for what all share has changed."""
+        for person in list(self._here.values()):
+            if person.look_directs_at is not None:
+                self._apply(person, at, lambda person: None)
 
     def _apply(self, person: PersonRecognition, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
         """Apply a step to one person; a bug that shows in it does not affect the others."""
@@ -171,22 +182,24 @@ class People:
 
     def _update(self, person: PersonRecognition) -> None:
         """Note when the person is due, whether the robot waits for its answer, and whether it is here."""
+        id, scene = person.id, self._scene
         if (question := person.talk.question) is not None:
-            self._scene.questions[person.id] = question
-        else:
-            self._scene.questions.pop(person.id, None)
-        (self._scene.asked.add if person.talk.is_asked else self._scene.asked.discard)(person.id)
-        self._agenda.set(person.id, person.deadline)
-        self.touched.add(person.id)
-        here, was_here = person.presence.here, person.id in self._here
-        (self._scene.found.add if here and person.presence.reported else self._scene.found.discard)(person.id)
+            scene.questions[id] = question
+        elif id in scene.questions:
+            del scene.questions[id]
+        (scene.asked.add if person.talk.is_asked else scene.asked.discard)(id)
+        self.agenda.set(id, person.deadline)
+        self.touched.add(id)
+        presence = person.presence
+        here, was_here = presence.here, id in self._here
+        (scene.found.add if here and presence.reported else scene.found.discard)(id)
         if was_here and not here:
-            del self._here[person.id]
-            self._scene.present.discard(person.id)
-            self._note(person, person.presence.left_at)
+            del self._here[id]
+            scene.present.discard(id)
+            self._note(person, presence.left_at)
         elif here and not was_here:
-            self._here[person.id] = person
-            self._scene.present.add(person.id)
+            self._here[id] = person
+            scene.present.add(id)
             person.talk.person_back()
             self._here = dict(sorted(self._here.items(), key=lambda one: one[1].number))
 
@@ -195,3 +208,8 @@ def _answered_by_other(taken_up: TakenUp, asked: PersonRecognition) -> None:
     """Tell the person who was asked that somebody else has answered."""
     _, by, action, at = taken_up
     asked.talk.other_answers(by, action, at)
+
+
+def _answered_for_all(answered: OngoingEvent, at: Seconds, asked: PersonRecognition) -> None:
+    """Tell a person that the robot's question to several people, maybe to this one, has been answered."""
+    asked.talk.take(at, lambda talk: talk.pair.answered_for_all(answered, at))

@@ -75,11 +75,17 @@ class PersonRecognition:
     @property
     def deadline(self) -> Seconds | None:
         """Time of the next step that is due by itself, unless an input comes before; then call `pass_time`."""
-        times = [self.gaze.deadline, self.presence.deadline, self.facial.deadline, self._look_directs_at]
-        times += self.talk.deadlines
-        times += [one.deadline for one in self.directed]
-        times += [one.until for one in self._doing.values()]
-        return min([at for at in times if at is not None], default=None)
+        times = [self.presence.deadline, *self.talk.deadlines]
+        if self.gaze.targets:
+            times += self.gaze.deadline, self.look_directs_at
+        if self.facial.event is not None:
+            times.append(self.facial.deadline)
+        for directed in self.directed:
+            times.append(directed.deadline)
+        for doing in self._doing.values():
+            times.append(doing.until)
+        known = [at for at in times if at is not None]
+        return min(known) if known else None
 
     @property
     def _timed_steps(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:
@@ -89,8 +95,18 @@ class PersonRecognition:
         yield from ((one.deadline, partial(self._expire_directed, one)) for one in self.directed)
         yield self.facial.deadline, self.facial.expire
         yield from self.talk.timed_steps
-        yield self._look_directs_at, self._look_directs
+        yield self.look_directs_at, self._look_directs
         yield from ((one.until, self._goes_on_too_long) for one in self._doing.values())
+
+    @property
+    def has_gaze_event(self) -> bool:
+        """True if a gaze event goes on, or the robot has just directed the person's gaze."""
+        return self.facial.event is not None or bool(self.directed or self._robot_directed)
+
+    @property
+    def is_involved(self) -> bool:
+        """True if anything goes on between the person and the robot that the robot's deeds may change."""
+        return self.has_gaze_event or self.talk.is_under_way
 
     def pass_time(self, at: Seconds) -> None:
         """Take the first step that is due at `at`. There is none if something that all share has put it off."""
@@ -100,11 +116,12 @@ class PersonRecognition:
                 return
 
     @property
-    def _look_directs_at(self) -> Seconds | None:
+    def look_directs_at(self) -> Seconds | None:
         """Time at which the person's look has lasted long enough to direct the robot's; None if it does not."""
-        if self.gaze.spent or self.gaze.ended is not None or "act" in self._doing:
+        gaze = self.gaze
+        if not gaze.targets or gaze.spent or gaze.ended is not None or "act" in self._doing:
             return None
-        if not any(map(self._scene.is_object, self.gaze.targets)):
+        if not any(map(self._scene.is_object, gaze.targets)):
             return None
         silent_since = self._scene.others_silent_since(self.id)
         return None if silent_since is None else max(self.gaze.since, silent_since) + DIRECT_BY_LOOK
@@ -212,10 +229,15 @@ class PersonRecognition:
     @property
     def contact(self) -> Probability | None:
         """Contact with the robot now, from 0 to 1; None: nobody has told where the person looks."""
-        together = any(each.is_shared for each in self.gaze_machines())
-        if self.presence.here and (self.on_robots_face or together or self.talk.speaks_to_robot):
+        targets = self.gaze.targets
+        if self.presence.here and (
+            self._scene.robot in targets
+            or self.talk.speaks_to_robot
+            or self.facial.is_shared
+            or any(one.is_shared for one in self.directed)
+        ):
             return 1.0
-        return None if self.gaze.since == 0.0 and not self.gaze.targets else 0.0
+        return None if self.gaze.since == 0.0 and not targets else 0.0
 
     @property
     def _face(self) -> str:
@@ -330,11 +352,17 @@ class PersonRecognition:
 
     def forget_idle(self, at: Seconds) -> None:
         """Drop finished directed gazes, and remember those of the robot for a while."""
-        self._robot_directed = [past for past in self._robot_directed if self._is_recent(past, at)]
-        for one in self.directed:
-            if one.state == IDLE and one.by_robot:
+        if self._robot_directed:
+            self._robot_directed = [past for past in self._robot_directed if self._is_recent(past, at)]
+        for one in [one for one in self.directed if one.state == IDLE]:
+            self.directed.remove(one)
+            if one.by_robot:
                 self._robot_directed.append(_Directed(one.objects, at))
-        self.directed = [one for one in self.directed if one.state != IDLE]
+
+    def waits_for(self, block: str, name: str) -> bool:
+        """True if a time limit runs from this sync point of a block of the robot."""
+        clocks = [clock for machine in self.gaze_machines() for clock in machine.clocks_of(block)]
+        return any(name in clock.waiting for clock in clocks)
 
     def point_realised(self, block: str, name: str, at: Seconds) -> None:
         """Take a realised sync point of a block of the robot: time limits may run from there."""

@@ -157,25 +157,35 @@ class SessionScene:
         """Start of the first speech of each person of which it is not known yet to whom it is."""
         self.listening_blocks: Latest[str, None] = Latest(BLOCKS_KEPT)
         """Blocks under way that the robot has announced as backchannels: they answer nobody."""
-        self.speech = 0
-        """Number of times that speech of any actor has begun or ended."""
+        self.silences = 0
+        """Number of times that all, or all but one, have fallen silent."""
         self.floor_changes = 0
         """Number of times that speech of any actor has begun or ended, or that its addressees became known."""
         self._fell_silent: list[tuple[Seconds, str]] = []
         """The two actors that fell silent last. Two are enough: the actor that asks is at most one of them."""
 
-    def see(self, world: World, at: Seconds) -> None:
-        """Take a view of the world. Objects once seen stay known: a covered piece has not gone (thesis 5.4.2)."""
-        self._objects.update(entity.id for entity in world.objects)
-        self._surfaces.update(entity.id for entity in world.entities if entity.kind == "surface")
+    def see(self, world: World, at: Seconds) -> bool:
+        """Take a view of the world. Objects once seen stay known: a covered piece has not gone (thesis 5.4.2).
+
+        True if something may count as an object now that did not before, or no longer.
+        """
+        people, known = set(), len(self._objects)
         for entity in world.entities:
-            if entity.kind in ("person", "hand"):
-                self._others.pop(entity.id, None)
-                self._others[entity.id] = at
-        for person in world.people:
-            if person.id != self.robot:
-                self.names |= {name.casefold(): person.id for name in (person.id, person.name) if name}
-        self.people_in_world = frozenset(person.id for person in world.people) - {self.robot}
+            id, kind = entity.id, entity.kind
+            if kind == "object":
+                self._objects.add(id)
+            elif kind == "surface":
+                self._surfaces.add(id)
+            else:
+                self._others.pop(id, None)
+                self._others[id] = at
+                if kind == "person" and id != self.robot:
+                    people.add(id)
+                    if entity.name or id not in self.people_in_world:
+                        self.names |= {name.casefold(): id for name in (id, entity.name) if name}
+        if people != self.people_in_world:
+            self.people_in_world = frozenset(people)
+        return not known or len(self._objects) > known
 
     def told_to(self, person: str, since: Seconds) -> Addressees | None:
         """Addressees of a speech by perception, if they were told before the speech; None: they were not."""
@@ -256,7 +266,6 @@ class SessionScene:
 
     def speaks(self, actor: str) -> None:
         self._speakers.add(actor)
-        self.speech += 1
         self.floor_changes += 1
 
     def falls_silent(self, actor: str, at: Seconds) -> None:
@@ -264,7 +273,7 @@ class SessionScene:
             self._speakers.discard(actor)
             others = [one for one in self._fell_silent if one[1] != actor]
             self._fell_silent = sorted((*others, (at, actor)))[-2:]
-            self.speech += 1
+            self.silences += len(self._speakers) <= 1
             self.floor_changes += 1
 
     def stops(self, actor: str, at: Seconds) -> None:

@@ -17,7 +17,7 @@ from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import HeadOwner
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.recognition import EventOutcome, RequestEvent, SignalTurn, TurnOutcome
+from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, TurnOutcome
 from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
@@ -107,8 +107,11 @@ class Session:
 
     def contacts(self) -> dict[str, Probability | None]:
         """Contact with each person for whom it may have changed since the last call."""
+        if not self._people.touched:
+            return {}
         touched, self._people.touched = self._people.touched, set()
-        return {id: self.persons[id].contact for id in touched if id in self.persons}
+        persons = self._people.persons
+        return {id: persons[id].contact for id in touched if id in persons}
 
     @property
     def busy(self) -> Set[str]:
@@ -120,7 +123,10 @@ class Session:
     @property
     def deadline(self) -> Seconds | None:
         """Time at which `advance` has something to do, unless an observation comes first."""
-        gaze, people = self.scene.gaze.deadline, self._people.deadline
+        people = self._people.agenda.earliest
+        if self.scene.gaze.ended is None:
+            return people
+        gaze = self.scene.gaze.deadline
         return people if gaze is None or (people is not None and people < gaze) else gaze
 
     def advance(self, now: Seconds) -> list[Effect]:
@@ -175,7 +181,10 @@ class Session:
                 self._cancel(observation, at)
             case SyncPointProgress(block=block):
                 name = self.blocks.realised(block, observation.behavior, observation.sync, at)
-                self._people.apply_to_all(at, lambda person: person.point_realised(block, name, at))
+                asked = {event.responder for event in self._live.values() if event.block == block}
+                for id in asked & self.persons.keys():
+                    if self.persons[id].waits_for(block, name):
+                        self._people.apply(id, at, lambda person: person.point_realised(block, name, at))
             case BlockProgress(block=str() as block, progress="start"):
                 self._block_begins(block, at)
             case BlockProgress(block=str() as block, progress="end"):
@@ -184,12 +193,29 @@ class Session:
                 self._robot_is_heard(bool(said), at)
             case HeadOwner(owner=owner):
                 self.scene.head_owner = owner
-                self._people.apply_to_all(at, lambda person: person.head_owner_changed(at))
+                self._people.apply_to_all(
+                    at, lambda person: person.head_owner_changed(at), lambda person: person.has_gaze_event
+                )
             case World():
                 self._people.see(observation, at)
             case Covered():
                 self.scene.covered = observation
                 self._people.apply_to_all(at, lambda person: person.hands_changed())
+        return self._take()
+
+    def resume(self, former: ConnectionEvent, at: Seconds) -> list[Effect]:
+        """Go on with a pair that a former life has begun. The end of its turn is not known: it counts as over now.
+
+        Nor is it known which actions answer the robot: all do. The pair has another id, and no delay is told of it.
+        """
+        person = former.person(self.robot)
+        event = OngoingEvent(
+            kind=former.kind, initiator=former.initiator, responder=former.responder, started=former.started.seconds,
+            cause=former.cause, optional=former.optional, limit=former.limit, accept=(*ACCEPT, "act"),
+            block=former.block, behavior=former.behavior, turn=former.turn, confidence=former.confidence,
+            is_former=True,
+        )  # fmt: skip
+        self._people.observe(person, at, lambda person: person.talk.take(at, lambda talk: talk.resumes(event, at)))
         return self._take()
 
     def lose_track(self, person: str, at: Seconds) -> list[Effect]:
@@ -207,6 +233,8 @@ class Session:
                 self._writer.publish(event, "lost", at)
 
     def _take(self) -> list[Effect]:
+        if not self._writer.effects:
+            return []
         for mishap in [effect for effect in self._writer.effects if isinstance(effect, Mishap)]:
             self._lose_untold(mishap.actor, mishap.at)
         effects = self._writer.take()
@@ -236,7 +264,9 @@ class Session:
                 listens = self.scene.is_listening(began.behavior)
                 self._say(began, at, lambda talk: talk.robot_gestures(began.action, at, listens=listens))
                 if began.action == "point":
-                    self._people.apply_to_all(at, lambda person: person.robot_points(began.targets, at))
+                    self._people.apply_to_all(
+                        at, lambda person: person.robot_points(began.targets, at), lambda person: person.directed
+                    )
 
     def _robot_speaks(self, began: ActionBegan, at: Seconds) -> None:
         self.scene.speaks(self.robot)
@@ -300,9 +330,14 @@ class Session:
                 speaks = any(action == "speak" for _, action in self._robot_actions)
                 if self.scene.robot_speaks_since is not None and not speaks:
                     self.scene.robot_falls_silent(at)
-                    self._tell("", at, lambda talk: talk.robot_falls_silent(at))
+                    self._ends_in_talk(at, lambda talk: talk.robot_falls_silent(at))
             case "nod" | "shake" | "point":
-                self._tell("", at, lambda talk: talk.robot_gesture_ends(ended.action, at))
+                self._ends_in_talk(at, lambda talk: talk.robot_gesture_ends(ended.action, at))
+
+    def _ends_in_talk(self, at: Seconds, step: Step) -> None:
+        self._people.apply_to_all(
+            at, lambda person: person.talk.take(at, step), lambda person: person.talk.is_under_way
+        )
 
     def _understand(self, words: Worded, at: Seconds) -> None:
         """Take the words of a person's speech, and to whom perception says that they are."""
@@ -338,7 +373,7 @@ class Session:
                 self._robot_ends(ended, at)
 
     def _robot_gaze_changed(self, at: Seconds) -> None:
-        self._people.apply_to_all(at, lambda person: person.gaze_changed(at))
+        self._people.apply_to_all(at, lambda person: person.gaze_changed(at), lambda person: person.is_involved)
 
     # -- requests -----------------------------------------------------------------------------------------------
 
@@ -428,12 +463,24 @@ class Session:
     def _ask(self, person: PersonRecognition, event: OngoingEvent, wanted: Event) -> None:
         event.accept = wanted.accept or ACCEPT
         at = event.started
+        asked = [each for each in self._live.values() if each.kind == "adjacency_pair" and each.turn == event.turn]
+        for each in asked if event.turn and len(asked) > 1 else ():
+            each.is_to_several = True
+        self._speaks_to(person.id, event.block, at)
         turn_end = self._ended_turns.get(event.turn) if event.turn else self.blocks.ended.get(event.block)
         person.talk.robot_asks(event)
         if turn_end is None:
             self._opens(event.turn, event.responder)
         else:
             person.talk.take(at, lambda talk: talk.turn_ends(max(turn_end, at)))
+
+    def _speaks_to(self, actor: str, block: str, at: Seconds) -> None:
+        """Note another addressee of what the robot says in this block already: it has announced them one by one."""
+        said = self.scene.robot_spoken
+        speaks = any(name.startswith(f"{block}:") and action == "speak" for name, action in self._robot_actions)
+        if speaks and actor and said is not None and said.to is not None and not said.is_to(actor):
+            said.to |= {actor}
+            self._tell(actor, at, lambda talk: talk.robot_speaks(max(said.since, at), listens=False))
 
     def _opens(self, turn: str, addressee: str) -> None:
         """Note a turn of the robot that goes on over several blocks."""
@@ -472,14 +519,21 @@ class Session:
                 repairs = signal.signal == "repaired"
                 self.announce(request)
                 self._opens(signal.turn, signal.actor)
+                self._speaks_to(signal.actor, request.block, at)
                 self._tell(signal.actor, at, lambda talk: talk.is_answered(at, repairs=repairs))
                 if request.block and request.block not in self.blocks.ended:
                     self._answering_blocks[request.block] = signal.actor
             case "aborted":
                 self._aborted_turns[signal.turn] = at
                 self._closes(signal.turn)
-                self._apply_to_addressees(signal.actor, at, lambda person: person.abort(at, turn=signal.turn))
+                self._abort(signal.actor, at, signal.turn)
         self._writer.effects.append(TurnOutcome(id=request.id, at=self._writer.stamp(at)))
+
+    def _abort(self, actor: str, at: Seconds, turn: str) -> None:
+        """End the pairs of a turn that was cut off; first that of who has cut in, which may answer for all."""
+        here = [person for person in self.persons.values() if person.presence.here and actor in ("", person.id)]
+        for person in sorted(here, key=lambda each: not each.talk.takes_floor):
+            self._people.apply(person.id, at, lambda person: person.abort(at, turn=turn))
 
     def _apply_to_addressees(self, actor: str, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
         """Apply a step to a known person, or to all (actor: empty)."""
@@ -503,7 +557,11 @@ class Session:
         self.blocks.ended[block] = at
         self.scene.listening_blocks.pop(block, None)
         self._robot_stops(at, f"{block}:")
-        self._people.apply_to_all(at, lambda person: person.block_ended(block, at, aborted=aborted))
+        self._people.apply_to_all(
+            at,
+            lambda person: person.block_ended(block, at, aborted=aborted),
+            lambda person: person.is_involved,
+        )
         answered = self._answering_blocks.pop(block, None)
         if answered is not None:
             self._tell(answered, at, lambda talk: talk.pair.answered_block_ended(at))

@@ -8,7 +8,7 @@ a look while the person's own look waits for it, the request waits for what beco
 event that was asked for; if they don't, the request begins an event of its own (decision 0187).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import ClassVar, NamedTuple
 
 from engage_hri.schemas.recognition import EventState
@@ -173,11 +173,16 @@ class SharedGaze(Machine):
 
     def realised(self, block: str, name: str, at: Seconds) -> None:
         """Take a realised sync point of a block of the robot: time limits may run from there."""
-        if self._asked is not None and self._asked.event.block == block:
-            self._asked.clock.realised(name, at)
-        if self.event is not None and self.event.block == block and self._clock is not None:
-            self._clock.realised(name, at)
+        for clock in self.clocks_of(block):
+            clock.realised(name, at)
         self._follow(at)
+
+    def clocks_of(self, block: str) -> Iterator[LimitClock]:
+        """Clocks of what a block of the robot has asked for."""
+        if self._asked is not None and self._asked.event.block == block:
+            yield self._asked.clock
+        if self.event is not None and self.event.block == block and self._clock is not None:
+            yield self._clock
 
     def _follow(self, at: Seconds) -> None:
         """Let the responder join who is there, now that the initiator has shown where to look."""

@@ -66,6 +66,11 @@ class Talk:
         return self._speech is not None and self._speech.is_to(self._scene.robot)
 
     @property
+    def takes_floor(self) -> bool:
+        """True while the person speaks to the robot, or has answered before its turn is over."""
+        return self._conversation.holds_floor or self._conversation.pair.is_interrupted
+
+    @property
     def question(self) -> Question | None:
         """The robot's question that waits for the person's answer, as far as is known; None: none does."""
         question = self._conversation.pair.question
@@ -75,6 +80,11 @@ class Talk:
     def is_asked(self) -> bool:
         """True if the robot asks the person, or waits for an answer, as far as is known."""
         return self._is_asked_in_line or self._conversation.pair.may_be_answered
+
+    @property
+    def is_under_way(self) -> bool:
+        """True if either speaks to the other, or something of the talk is open."""
+        return bool(self._line) or self._conversation.is_under_way
 
     # -- time ---------------------------------------------------------------------------------------------------
 

@@ -16,7 +16,7 @@ from engage_hri.schemas.units import Probability, Seconds, Stamp
 from engage_hri.services.bus.deadlines import Deadlines
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import PersonForgotten
-from engage_hri.services.recognition.statistics.engagement import Engagement
+from engage_hri.services.recognition.statistics.engagement import Engagement, EngagementEstimate
 from engage_hri.services.recognition.statistics.tally import EventTally
 
 EVERYBODY = ""
@@ -59,6 +59,7 @@ class PublishedStatistics:
     def __init__(self, robot: str, config: RecognitionConfig, clock: str = "loop") -> None:
         self._robot = robot
         self._clock = clock
+        self._config = config
         self._actors = defaultdict[str, _ActorStatistics](partial(_ActorStatistics, config, clock))
         self._changed: set[str] = set()
         """Actors of whom something has come in since `told` was last called."""
@@ -75,14 +76,14 @@ class PublishedStatistics:
         changes: Iterable[ConnectionEvent | PersonForgotten],
         busy: Set[str],
         now: Seconds,
-        contacts: Mapping[str, Probability] = {},
+        contacts: Mapping[str, Probability | None] = {},
     ) -> None:
         """Count changes, in their order.
 
         busy: persons with a task in hand. contacts: how much of a contact there is now, where that may have changed.
         """
         for actor, much in contacts.items():
-            if self._actors[actor].engagement.contact.now != much:
+            if much is not None and self._actors[actor].engagement.contact.now != much:
                 self._actors[actor].engagement.touch(much, now)
                 self._changed.add(actor)
         for change in changes:
@@ -98,6 +99,20 @@ class PublishedStatistics:
                 self._changed.add(name)
         if busy != self._busy:
             self._get_busy(frozenset(busy), now)
+
+    def resume(self, former: Statistics, now: Seconds) -> None:
+        """Go on from the numbers of a former life. Its contacts and recent events are not known."""
+        name = former.actor
+        one = self._actors[name] = _ActorStatistics(self._config, self._clock)
+        one.tally.resume(former.session)
+        one.engagement.estimate = EngagementEstimate(former.engagement, former.level, former.reasons)
+        one.is_new = True
+        self._changed.add(name)
+
+    def resume_event(self, event: ConnectionEvent) -> None:
+        """Take an event that goes on from a former life, which has counted its start."""
+        for name in (event.person(self._robot), EVERYBODY):
+            self._actors[name].tally.resume_event(event)
 
     def _get_busy(self, busy: frozenset[str], now: Seconds) -> None:
         """Freeze the estimate of who has got busy, and of all, as it is now; or let it go."""

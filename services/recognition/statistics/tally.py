@@ -44,6 +44,11 @@ class Spread(Struct):
     def mean(self) -> Seconds | None:
         return self.sum / self.number if self.number else None
 
+    @classmethod
+    def resumed(cls, number: int, least: Seconds | None, mean: Seconds | None, greatest: Seconds | None) -> "Spread":
+        """Spread of `number` delays, of which these are known; none if there is no mean."""
+        return cls() if mean is None else cls(number, number * mean, least, greatest)
+
 
 class Count(Struct):
     """Count of one kind of event. failed: without the optional ones."""
@@ -58,6 +63,8 @@ class Count(Struct):
 
     def decide(self, event: ConnectionEvent) -> None:
         """Count a success or a failure; nothing else changes the rates."""
+        if event.is_answered_by_another:
+            return
         if event.state == "succeeded":
             self.succeeded += 1
             if event.delay is None:
@@ -105,6 +112,13 @@ class Starts:
         else:
             insort(kept, start)
 
+    def resume(self, count: int, mean: Seconds | None, largest: Seconds | None, last: Stamp | None) -> None:
+        """Go on from the numbers of a former life."""
+        if last is not None and count:
+            self._kept, self._settled = [last.seconds], count - 1
+            if mean is not None and largest is not None:
+                self._first, self._largest_settled = last.seconds - mean * (count - 1), largest
+
     def _settle(self, horizon: Seconds) -> None:
         """Summarize the starts before `horizon`. The last of them is kept, for the next difference."""
         settled = bisect_left(self._kept, horizon) - 1
@@ -130,7 +144,7 @@ class Starts:
 
     @property
     def largest_difference(self) -> Seconds | None:
-        return None if self.count < 2 else max(self._largest_settled, *_differences(self._kept))
+        return None if self.count < 2 else max((self._largest_settled, *_differences(self._kept)))
 
 
 def _differences(starts: Sequence[Seconds]) -> list[Seconds]:
@@ -152,6 +166,26 @@ class _Window:
         self.starts.add(start)
         if event.cause != "maintenance":
             self.own_starts.add(start)
+
+    def resume(self, former: WindowStatistics) -> None:
+        """Go on from the numbers of a former life.
+
+        It does not tell how many starts the maintenance policy did not cause, only their mean difference and the last
+        of them. So the first start of all is taken for one of them.
+        """
+        for each in former.kinds:
+            self.counts[each.kind] = Count(
+                each.count, each.succeeded, each.failed,
+                Spread.resumed(each.succeeded, each.delay_min, each.delay_mean, each.delay_max),
+                Spread.resumed(each.failed, each.failed_delay_min, each.failed_delay_mean, each.failed_delay_max),
+                each.delay_error,
+            )  # fmt: skip
+        self.starts.resume(former.events, former.mtbce, former.max_gap, former.last_start)
+        own, last, mean = 1, former.last_start_without_maintenance, former.mtbce_without_maintenance
+        if last is not None and mean and former.last_start is not None and former.mtbce is not None:
+            first = former.last_start.seconds - former.mtbce * (former.events - 1)
+            own = 1 + round((last.seconds - first) / mean)
+        self.own_starts.resume(own, mean, former.max_gap, last)
 
     def statistics(self, clock: str) -> WindowStatistics:
         starts, own = self.starts, self.own_starts
@@ -226,6 +260,17 @@ class EventTally:
         length = self._length
         return [event for event in self._recent.values() if event.started.seconds + length > now]
 
+    def resume(self, former: WindowStatistics) -> None:
+        """Go on from the counts of a former life; the recent window begins anew."""
+        self._session.resume(former)
+
+    def resume_event(self, event: ConnectionEvent) -> None:
+        """Take an event that is not decided. The counts have its start, unless it came after they were last told."""
+        last = self.starts.last
+        if last is None or event.started.seconds > last:
+            self.feed(event)
+        self._open[event.id] = False
+
     @property
     def starts(self) -> Starts:
         """Starts of the session."""
@@ -252,5 +297,9 @@ class EventTally:
         starts = [event.started.seconds for event in events]
         if not starts:
             return RecentPace()
-        judged = [event.state for event in events if not event.optional and event.state in ("succeeded", "failed")]
+        judged = [
+            event.state
+            for event in events
+            if not event.optional and event.state in ("succeeded", "failed") and not event.is_answered_by_another
+        ]
         return RecentPace(min(starts), max(starts), len(starts), judged.count("failed"), len(judged))

@@ -5,7 +5,6 @@ phrase costs 1 and only singles the piece out together with pointing. Parameters
 """
 
 from collections.abc import Iterable, Sequence
-from typing import Literal
 
 from msgspec import Struct
 
@@ -106,16 +105,19 @@ def request(
     table: TangramTable,
     *,
     deictic: str = "",
-    verb: Literal["move", "fix"] = "move",
+    asks: str = "Please move",
     piece_reliability: float,
     landmark_reliability: float,
 ) -> tuple[str | PieceMention, ...]:
-    """Word a request, such as "Please move the blue piece so that it is touching the top of the rectangle"."""
+    """Word a request, such as "Please move the blue piece so that it is touching the top of the rectangle".
+
+    asks: the words before the piece.
+    """
     side = SIDE_WORDS.get(wanted.side, wanted.side)
     landmark = name_of(wanted.landmark, table)
     piece = name_of(wanted.piece, table)
     return (
-        f"Please {verb}",
+        asks,
         PieceMention(piece=wanted.piece, phrase=piece, reliability=piece_reliability, deictic=deictic),
         f"so that it is touching the {side} of",
         PieceMention(piece=wanted.landmark, phrase=landmark, reliability=landmark_reliability),

@@ -5,7 +5,7 @@ over it. A piece that is not in view keeps its last place, with confidence 0.
 """
 
 import math
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from itertools import accumulate
 
@@ -20,6 +20,8 @@ STEADY: Seconds = 0.5
 """Time that a piece must rest in view, with no hand over it, before its place is believed. Ours."""
 HAND_OVER: Meters = 0.08
 """Distance of their centers, seen from above, below which a hand covers a piece: half a hand and half a piece."""
+AWAY: Seconds = 5.0
+"""Time for which somebody must have been out of sight to have gone: who is seen again has come anew. Ours."""
 WINDOW: Seconds = 1.0
 """Age of the oldest frame that is judged."""
 
@@ -58,6 +60,8 @@ class PiecesInView:
         self._known: dict[str, Entity] = {}
         self._people: dict[str, Seconds] = {}
         """Time at which each person was last seen."""
+        self.visits: Counter[str] = Counter()
+        """How often each person has come."""
         self._present: tuple[str, ...] = ()
         self._last: Seconds = -math.inf
 
@@ -65,6 +69,7 @@ class PiecesInView:
         """Take in a frame."""
         self._people |= dict.fromkeys(self._present, now)
         self._present = tuple(person.id for person in world.people)
+        self.visits.update(id for id in self._present if now > self._people.get(id, -math.inf) + AWAY)
         self._last = now
         hands = [entity for entity in world.entities if entity.kind == "hand"]
         in_view = {piece.id: piece for piece in world.objects if _is_clear(piece, hands)}
@@ -86,9 +91,13 @@ class PiecesInView:
         """True if the place of every piece is certain."""
         return all(self._is_steady(id, now) for id in self._known)
 
+    def people(self, now: Seconds) -> tuple[str, ...]:
+        """Ids of all who are there, or were a moment ago."""
+        return tuple(dict.fromkeys((*self._present, *(id for id, at in self._people.items() if now < at + STEADY))))
+
     def person(self, now: Seconds, known: str = "") -> str | None:
         """Id of a person who is there, or was a moment ago, of `known` rather than of another; None: nobody."""
-        there = [*self._present, *(id for id, at in self._people.items() if now < at + STEADY)]
+        there = self.people(now)
         return known if known in there else next(iter(there), None)
 
     def deadline(self, now: Seconds) -> Seconds | None:

@@ -4,11 +4,12 @@ Pure: neither bus nor clock. The service grants the wishes; a test plays the rob
 """
 
 from collections.abc import Generator, Iterable
-from typing import TypeVar
+from typing import TypeVar, cast
 
 from msgspec import Struct
 
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
+from engage_hri.schemas.recognition import EngagementLevel
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import Entity
 from engage_hri.services.tangram.collaboration.config import CollaborationConfig
@@ -19,6 +20,7 @@ from engage_hri.services.tangram.collaboration.fragments import (
     fragment,
     request,
 )
+from engage_hri.services.tangram.collaboration.placement import has_been_placed
 from engage_hri.services.tangram.collaboration.task import Goal, Instruction, check
 from engage_hri.services.tangram.table import TangramTable
 
@@ -38,6 +40,14 @@ THINKING: Seconds = 1.0
 """Time between "Ummmm," and "good.". Ours."""
 PIECE_RELIABILITY: Probability = 0.95
 """Least reliability of a reference to the piece to move, and to the trapezoid when introduced. Scenario page."""
+ASKING = {
+    "": "Please move",
+    "fix": "Please fix",
+    "help": "May I help you? I show you what comes next. Please put",
+    "again": "Let us try it together. Can you put",
+}
+"""Words before the piece of a request: the first; of one that was laid wrongly; of one that nobody has moved, which
+is then shown; and of one that not even this has moved."""
 LANDMARK_RELIABILITY: Probability = 0.85
 """Least reliability of a reference to a landmark, and to the rectangle when introduced. Scenario page."""
 
@@ -67,6 +77,18 @@ class AwaitPlacement(Struct, frozen=True):
     timeout: Seconds
 
 
+class Attendee(Struct, frozen=True):
+    """Person who is there. level: how engaged, as recognition tells. visit: how often they have come."""
+
+    id: str
+    level: EngagementLevel = "unknown"
+    visit: int = 1
+
+
+class LookAround(Struct, frozen=True):
+    """Look who is there. Answer: a `Attendee` for each."""
+
+
 class AwaitPerson(Struct, frozen=True):
     """Wait until a person is there. Answer: an id, that of `known` if this one is there."""
 
@@ -83,8 +105,8 @@ class Pause(Struct, frozen=True):
     seconds: Seconds
 
 
-Wish = Perform | Observe | AwaitPlacement | AwaitPerson | AwaitDeparture | Pause
-Answer = FragmentOutcome | tuple[Entity, ...] | str | bool | None
+Wish = Perform | Observe | AwaitPlacement | LookAround | AwaitPerson | AwaitDeparture | Pause
+Answer = FragmentOutcome | tuple[Entity, ...] | tuple[Attendee, ...] | str | bool | None
 R = TypeVar("R")
 Plan = Generator[Wish, Answer, R]
 
@@ -101,19 +123,45 @@ class Manager:
         self.goal = Goal(table)
         self._universe = tuple(piece.id for piece in table.pieces)
         self._person = table.person.id
+        self._greeted: dict[str, int] = {}
+        """Visit for which each person was greeted."""
+        self._ignored = 0
+        """Number of requests in a row after which nobody laid anything anywhere."""
 
     def welcome(self) -> Plan[None]:
-        """Wait for a person, and let them settle."""
+        """Wait for a person, and let them settle. Who is there then is greeted by the plan."""
         self._person = ""
-        yield from self._meet()
+        yield from self._find()
+        self._greeted = {guest.id: guest.visit for guest in (yield from self._company())}
 
-    def _meet(self) -> Plan[None]:
+    def _find(self) -> Plan[None]:
         """Go on with the person; with another one, or the next who comes, if this one has left. They may settle."""
         person = yield AwaitPerson(self._person)
         assert isinstance(person, str)
         if person != self._person:
             self._person = person
             yield Pause(ARRIVAL)
+
+    def _meet(self) -> Plan[None]:
+        """Go on with the person who is there. Who has come, to make the figure or to attend, is greeted once."""
+        yield from self._find()
+        for guest in (yield from self._company()):
+            is_there_for_it = guest.id == self._person or guest.level in ("engaging", "engaged")
+            if is_there_for_it and self._greeted.get(guest.id) != guest.visit:
+                self._greeted[guest.id] = guest.visit
+                words = "Hello again, let us go on." if guest.visit > 1 else "Hello, we are making a tangram."
+                id = f"hello-{guest.id}-{guest.visit}"
+                yield Perform(fragment(id, (words,), addressee=guest.id, universe=self._universe))
+                yield Pause(PAUSE)
+
+    def _company(self) -> Plan[tuple[Attendee, ...]]:
+        guests = yield LookAround()
+        return cast("tuple[Attendee, ...]", guests)
+
+    def has_lost(self) -> Plan[bool]:
+        """Tell whether the person does nothing, and attends to the robot no more, though they are there."""
+        levels = [guest.level for guest in (yield from self._company()) if guest.id == self._person]
+        return self._ignored >= ATTEMPTS and levels == ["disengaged"]
 
     def say(self, id: str, sentence: Sentence, *, look: bool = True) -> Plan[None]:
         """Say a full turn that asks for nothing."""
@@ -137,43 +185,46 @@ class Manager:
         yield Pause(PAUSE)
 
     def instruct(self, id: str, instruction: Instruction) -> Plan[bool]:
-        """Ask for a placement until it is right: again if nothing happens, for a fix if it is wrong.
+        """Ask for a placement until it is right: with help if nothing happens, for a fix if it is wrong.
 
         Returns True if it was right in the end.
         """
-        request_id, fix = id, False
+        request_id, how = id, ""
         pieces = yield from self.observe()
         for attempt in range(1, ATTEMPTS + 1):
             yield from self._meet()
-            yield Perform(self._request(request_id, instruction, fix=fix))
+            yield Perform(self._request(request_id, instruction, how))
             placed = yield AwaitPlacement(instruction.wanted.piece, pieces, self.config.placement)
             yield Pause(SETTLE)
-            pieces = yield from self.observe()
+            before, pieces = pieces, (yield from self.observe())
+            has_moved_any = any(has_been_placed(each.id, before, pieces) for each in pieces)
+            self._ignored = 0 if placed or has_moved_any else self._ignored + 1
             verdict = check(instruction, pieces)
             if verdict.right:
                 return True
-            fix = placed is True and verdict.seen
+            is_wrong = placed is True and verdict.seen
+            how = "fix" if is_wrong else "again" if how == "help" else "help"
             number = f"-{attempt}" if attempt > 1 else ""
-            request_id = f"{id}-{'fix' if fix else 'again'}{number}"
+            request_id = f"{id}-{how}{number}"
         return False
 
     def observe(self) -> Plan[tuple[Entity, ...]]:
         """Look at the pieces as they lie."""
         pieces = yield Observe(PATIENCE)
-        assert isinstance(pieces, tuple)
-        return pieces
+        return cast("tuple[Entity, ...]", pieces)
 
     def farewell(self) -> Plan[None]:
         yield AwaitDeparture(FAREWELL)
 
-    def _request(self, id: str, instruction: Instruction, *, fix: bool = False) -> TurnFragment:
+    def _request(self, id: str, instruction: Instruction, how: str) -> TurnFragment:
+        """how: key of `ASKING`. Whoever is helped is shown the place, too."""
         sentence = request(
             instruction.wanted,
             self.table,
-            verb="fix" if fix else "move",
-            deictic="" if fix else instruction.deictic,
+            asks=ASKING[how],
+            deictic="" if how else instruction.deictic,
             piece_reliability=PIECE_RELIABILITY,
-            landmark_reliability=LANDMARK_RELIABILITY,
+            landmark_reliability=PIECE_RELIABILITY if how == "help" else LANDMARK_RELIABILITY,
         )
         return fragment(id, sentence, addressee=self._person, universe=self._universe, accept=MANIPULATION)
 
@@ -232,7 +283,13 @@ def task(manager: Manager) -> Plan[None]:
             yield from manager.approve(f"good-{number}")
         else:
             given_up.add(instruction.wanted.piece)
-    finished = "Look, we made an anchor." if not given_up else "Look, we almost made an anchor."
+            if (yield from manager.has_lost()):
+                yield from manager.say("let-go", ("You have other things to do. Thank you for playing, goodbye.",))
+                return
+    finished = "Look, we made an anchor."
+    if given_up:
+        is_begun = len(manager.goal.placed(pieces)) > 1
+        finished = "Look, we almost made an anchor." if is_begun else "Let us make the anchor another time."
     yield from manager.say("finished", (finished,), look=False)
     yield from manager.say("goodbye", ("Thanks for playing. That was fun, goodbye.",), look=False)
     yield from manager.farewell()

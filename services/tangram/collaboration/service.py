@@ -8,6 +8,7 @@ from functools import partial
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError
+from engage_hri.schemas.recognition import EngagementLevel, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus
@@ -39,12 +40,16 @@ async def collaborate(bus: Bus, ready: Ready, config: CollaborationConfig) -> No
     plan = plans.script(manager, turns(manager)) if config.mode == "scripted" else plans.task(manager)
     async with Robot.on(bus) as robot, asyncio.TaskGroup() as tasks:
         engine = _Engine(robot, bus, PiecesInView())
-        with robot.worlds() as worlds:
-            watching = tasks.create_task(engine.watch(worlds), name="watch the table")
+        with robot.worlds() as worlds, robot.engagement() as levels:
+            watching = [
+                tasks.create_task(engine.watch(worlds), name="watch the table"),
+                tasks.create_task(engine.attend(levels), name="watch the people"),
+            ]
             tell_settings(bus, "collaboration", config)
             ready()
             await _follow(plan, engine)
-            watching.cancel()
+            for task in watching:
+                task.cancel()
 
 
 async def _follow(plan: plans.Plan[None], engine: "_Engine") -> None:
@@ -65,11 +70,16 @@ class _Engine:
         self._bus = bus
         self._view = view
         self._seen = asyncio.Event()
+        self._levels: dict[str, EngagementLevel] = {}
 
     async def watch(self, worlds: Feed[World]) -> None:
         async for world in worlds:
             self._view.see(world, self._robot.now())
             self._seen.set()
+
+    async def attend(self, levels: Feed[Statistics]) -> None:
+        async for told in levels:
+            self._levels[told.actor] = told.level
 
     async def grant(self, wish: plans.Wish) -> plans.Answer:
         now, view = self._robot.now(), self._view
@@ -86,6 +96,10 @@ class _Engine:
             case plans.AwaitPlacement(piece=piece, before=before, timeout=timeout):
                 is_placed = partial(has_been_placed, piece, before)
                 return await self._wait_until(lambda at: is_placed(view.pieces(at)), now + timeout)
+            case plans.LookAround():
+                return tuple(
+                    plans.Attendee(id, self._levels.get(id, "unknown"), view.visits[id]) for id in view.people(now)
+                )
             case plans.AwaitPerson(known=known):
                 await self._wait_until(lambda at: view.person(at) is not None, math.inf)
                 return view.person(self._robot.now(), known)

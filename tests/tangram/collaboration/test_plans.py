@@ -1,6 +1,6 @@
 """The manager's plans, played by hand: no bus, no clock, no robot."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import pytest
 from msgspec.structs import replace
@@ -8,13 +8,16 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import Gaze, Reference, Speech
 from engage_hri.schemas.footprints import poses_touching
 from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.recognition import EngagementLevel
 from engage_hri.schemas.world import Entity
 from engage_hri.services.tangram.collaboration import appendix_b
 from engage_hri.services.tangram.collaboration.config import CollaborationConfig
 from engage_hri.services.tangram.collaboration.plans import (
+    Attendee,
     AwaitDeparture,
     AwaitPerson,
     AwaitPlacement,
+    LookAround,
     Manager,
     Observe,
     Pause,
@@ -46,10 +49,18 @@ class Player:
 
     hidden: a piece that is laid nowhere, and not seen any more once it has been moved.
     people: who is there, one after the other; each leaves after eight fragments.
+    level: engagement of this person. others: who else is there after so many fragments.
     """
 
     def __init__(
-        self, *, wrong: int = 0, idle: int = 0, hidden: str = "", people: Sequence[str] = ("human",)
+        self,
+        *,
+        wrong: int = 0,
+        idle: int = 0,
+        hidden: str = "",
+        people: Sequence[str] = ("human",),
+        level: EngagementLevel = "engaged",
+        others: Callable[[int], tuple[Attendee, ...]] = lambda performed: (),
     ) -> None:
         self.pieces = {piece.id: TABLE.lying(piece, piece.start) for piece in TABLE.pieces}
         self.performed: list[TurnFragment] = []
@@ -57,6 +68,8 @@ class Player:
         self._idle = idle
         self._hidden = hidden
         self._people = people
+        self._level: EngagementLevel = level
+        self._others = others
         self.pauses: list[float] = []
 
     def play(self, plan: Plan[None]) -> list[TurnFragment]:
@@ -74,8 +87,10 @@ class Player:
                     answer = self._seen()
                 case AwaitPlacement(piece=piece):
                     answer = self._place(piece)
+                case LookAround():
+                    answer = (Attendee(self._here, self._level), *self._others(len(self.performed)))
                 case AwaitPerson(known=known):
-                    here = self._people[min(len(self.performed) // 8, len(self._people) - 1)]
+                    here = self._here
                     assert known in ("", *self._people)
                     answer = here
                 case AwaitDeparture():
@@ -84,6 +99,10 @@ class Player:
                     self.pauses.append(seconds)
                     answer = None
         raise AssertionError("the plan does not end")
+
+    @property
+    def _here(self) -> str:
+        return self._people[min(len(self.performed) // 8, len(self._people) - 1)]
 
     def _seen(self) -> tuple[Entity, ...]:
         return tuple(self.pieces.values())
@@ -153,6 +172,7 @@ def test_when_somebody_leaves_the_robot_goes_on_with_who_is_there_then(mode: str
 
     assert set(spoken_to[:8]) == {"ann"}
     assert set(spoken_to[9:]) == {"ben"}  # the ninth may be the second half of a turn that began with ann
+    assert [fragment.id for fragment in performed if fragment.id.startswith("hello-")] == ["hello-ben-1"]
     assert player.pauses.count(4.0) == 2  # each may settle
 
 
@@ -213,17 +233,78 @@ def test_a_misplaced_piece_is_asked_to_be_fixed() -> None:
     assert fix == "Please fix the blue piece so that it is touching the top of the rectangle"
 
 
-def test_a_request_that_nobody_follows_is_repeated() -> None:
+def test_a_request_that_nobody_follows_comes_with_help_and_then_in_other_words() -> None:
     fragments = scripted(Player(idle=2))
 
-    assert list(fragments)[3:7] == ["step-5", "step-5-again", "step-5-again-2", "step-7-ours-a"]
-    assert spoken(fragments["step-5-again"]) == spoken(fragments["step-5"])
+    assert list(fragments)[3:7] == ["step-5", "step-5-help", "step-5-again-2", "step-7-ours-a"]
+    where = "the blue piece so that it is touching the top of the rectangle"
+    assert spoken(fragments["step-5"]) == f"Please move {where}"
+    assert spoken(fragments["step-5-help"]) == (f"May I help you? I show you what comes next. Please put {where}")
+    assert spoken(fragments["step-5-again-2"]) == f"Let us try it together. Can you put {where}"
+
+
+def test_who_is_helped_is_shown_the_piece_and_its_place() -> None:
+    shown = [it for it in scripted(Player(idle=1))["step-5-help"].behaviors if isinstance(it, Reference)]
+
+    assert [(it.target, it.minimum_reliability) for it in shown] == [("blue-square", 0.95), ("rectangle", 0.95)]
+
+
+@pytest.mark.parametrize(("level", "is_let_go"), [("disengaged", True), ("disengaging", False), ("engaged", False)])
+def test_who_follows_no_request_and_attends_no_more_is_let_go(level: EngagementLevel, is_let_go: bool) -> None:
+    player = Player(idle=1000, level=level)
+
+    performed = player.play(task(manager()))
+
+    assert (spoken(performed[-1]) == "You have other things to do. Thank you for playing, goodbye.") is is_let_go
+    assert len([it for it in performed if it.id.startswith("move-1")]) == 3  # only after three requests
+
+
+def test_who_has_made_a_part_of_it_hears_so() -> None:
+    player = Player()
+    place = player._place
+
+    def place_two(piece: str) -> bool:
+        return place(piece) if len(player.performed) < 10 else False
+
+    player._place = place_two  # type: ignore[method-assign]
+    performed = player.play(task(manager()))
+
+    assert spoken(performed[-2]) == "Look, we almost made an anchor."
+
+
+def test_who_lays_another_piece_than_the_one_asked_for_is_not_let_go() -> None:
+    player = Player(level="disengaged")
+
+    def place_another(piece: str) -> bool:
+        other = player.pieces["trapezoid"]
+        player.pieces["trapezoid"] = replace(other, position=(other.position[0] + 0.1, *other.position[1:]))
+        return False
+
+    player._place = place_another  # type: ignore[method-assign]
+
+    assert "let-go" not in {it.id for it in player.play(task(manager()))}
+
+
+def test_who_comes_is_greeted_once_each_time() -> None:
+    def others(performed: int) -> tuple[Attendee, ...]:
+        """Ben passes by. Cem attends, is away for a while, and comes again."""
+        cem = Attendee("cem", "engaging", visit=1 if performed < 10 else 2)
+        return (Attendee("ben", "disengaged"), *((cem,) if 2 < performed < 6 or performed > 9 else ()))
+
+    performed = Player(others=others).play(task(manager()))
+
+    assert {it.addressee for it in performed} == {"human", "cem"}
+    greetings = [(it.id, spoken(it)) for it in performed if it.addressee == "cem"]
+    assert greetings == [
+        ("hello-cem-1", "Hello, we are making a tangram."),
+        ("hello-cem-2", "Hello again, let us go on."),
+    ]
 
 
 def test_a_piece_that_is_not_seen_any_more_is_asked_for_again_and_never_for_a_fix() -> None:
     fragments = scripted(Player(hidden="blue-square"))
 
-    assert list(fragments)[3:7] == ["step-5", "step-5-again", "step-5-again-2", "step-7-ours-a"]
+    assert list(fragments)[3:7] == ["step-5", "step-5-help", "step-5-again-2", "step-7-ours-a"]
 
 
 def test_what_is_right_when_it_is_seen_again_needs_no_placement() -> None:
@@ -237,7 +318,7 @@ def test_what_is_right_when_it_is_seen_again_needs_no_placement() -> None:
 
     player._place = unseen  # type: ignore[method-assign]
 
-    assert not [id for id in scripted(player) if "again" in id]
+    assert not [id for id in scripted(player) if "help" in id]
 
 
 def test_a_human_who_does_nothing_does_not_stop_the_manager() -> None:
@@ -259,7 +340,7 @@ def test_the_task_gives_a_piece_up_after_its_attempts_and_says_so() -> None:
 
     performed = player.play(task(manager()))
 
-    assert spoken(performed[-2]) == "Look, we almost made an anchor."
+    assert spoken(performed[-2]) == "Let us make the anchor another time."
     assert {it.id.partition("-again")[0] for it in performed if "again" in it.id} == {"move-1", "move-2"}
 
 

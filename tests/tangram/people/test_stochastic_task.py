@@ -28,7 +28,7 @@ def left_open(record: Record) -> list[str]:
 
 
 def times_asked_again(record: Record) -> int:
-    return sum("-fix" in block or "-again" in block for block in record.outcomes)
+    return sum(any(how in block for how in ("-fix", "-help", "-again")) for block in record.outcomes)
 
 
 async def test_the_anchor_is_made_and_nothing_stays_open():

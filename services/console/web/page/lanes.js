@@ -1,4 +1,4 @@
-// Lanes over time: connection events, and behaviors as planned and as measured. The present is near the right edge.
+// Lanes over time: who speaks, connection events, and behaviors as planned and as measured. The present is near the right edge.
 import { clock, color, element, KINDS, seconds, sized } from "./look.js";
 
 const PAST = 26; // seconds in view
@@ -97,6 +97,56 @@ function caption(context, text, from, to, middle, room, inside) {
     context.fillText(text, to + 5, middle);
   }
   context.textBaseline = "alphabetic";
+}
+
+// -- who speaks ------------------------------------------------------------------------------------------------------
+
+export function floorLanes(panel) {
+  panel.querySelector(".legend").replaceChildren(
+    element("span", {}, element("i", { style: "background: var(--speech)" }), "speaks"),
+    element("span", {}, element("i", { style: "background: var(--back)" }), "into the robot's turn"),
+  );
+  return lanes(panel, tellFloor, (view) => {
+    const { context, state, x, width, height, now, first } = view;
+    const names = speakers(state);
+    const size = (height - AXIS) / Math.max(names.length, 3);
+    const levels = new Map([...state.measures.values()].map((each) => [each.actor, each.level]));
+    context.font = `${Math.min(LABEL, size * 0.62)}px system-ui, sans-serif`;
+    names.forEach((name, index) => row(context, view, index * size, size, levels.has(name) ? `${name}: ${levels.get(name)}` : name, index % 2));
+    context.save();
+    context.beginPath();
+    context.rect(view.names, 0, width - view.names, height);
+    context.clip();
+    const next = new Map(); // where the speech that follows begins, by row
+    for (const speech of [...(state.floor ?? [])].reverse()) {
+      if (speech.until !== null && speech.until < first - 8) continue;
+      const index = names.indexOf(speech.actor);
+      const [from, to, middle] = [x(speech.since), Math.max(x(speech.until ?? now), x(speech.since) + 3), (index + 0.5) * size];
+      context.fillStyle = color(speech.taken ? "--back" : "--speech");
+      context.fillRect(from, middle - size * 0.34, to - from, size * 0.68);
+      context.fillStyle = color("--ink");
+      const [begins, room] = [Math.max(from, view.names), next.get(index) ?? width];
+      const text = fitting(context, said(speech, state), Math.max(to - begins - 8, room - to - 10));
+      if (to > view.names && text.length > 3) caption(context, text, begins, to, middle, room, true);
+      next.set(index, from);
+    }
+    context.restore();
+    present(context, x, now, height);
+  });
+}
+
+// The robot, those who are measured, and those who speak, each once.
+const speakers = (state) => [...new Set([state.robot, ...[...state.measures.keys()].filter(Boolean).sort(), ...(state.floor ?? []).map((each) => each.actor)])];
+
+function said({ to, taken, words }, { robot }) {
+  const whom = to.length ? `to ${to.map((each) => (each === robot ? "the robot" : each)).join(" and ")}` : "";
+  return [taken || whom, words && `“${words}”`].filter(Boolean).join(": ");
+}
+
+function tellFloor(state) {
+  const open = (state.floor ?? []).filter((each) => each.until === null);
+  const levels = [...state.measures.values()].filter((each) => each.actor).map((each) => `${each.actor} is ${each.level}`);
+  return `Speaking: ${open.map((each) => `${each.actor} ${said(each, state)}`.trim()).join(", ") || "nobody"}. ${levels.join(", ") || "Nobody's engagement is known"}.`;
 }
 
 // -- connection events ---------------------------------------------------------------------------------------------

@@ -225,7 +225,7 @@ export function switched(place) {
 const WITHOUT = {
   generation: ["nobody rules the head, and what it is to say waits", ["head"]],
   realizer: ["it performs nothing", ["behaviors", "net"]],
-  recognition: ["it notices no connection events", ["events", "measures"]],
+  recognition: ["it notices no connection events", ["floor", "events", "measures"]],
   control: ["its body is shown as it was last", ["scene", "above"]],
 };
 

@@ -6,6 +6,7 @@ const MAIN = [
   ["scene", "Scene", `<div class="space" role="img" aria-label="The scene in 3D"></div>
     <div class="views" role="group" aria-label="Where you look from"></div>`],
   ["above", "From above", `<svg class="map" role="group" aria-label="The table from above"></svg>`],
+  ["floor", "Who speaks, and to whom", `${what("Each speech of robot and people, with those it is for, and how engaged each person is.")}<canvas role="img" tabindex="0"></canvas><p class="legend"></p>`],
   ["events", "Connection events", `${what("Moments in which robot and people connect: a look that the other follows, eyes that meet, a turn that is answered, a nod while listening.")}<canvas role="img" tabindex="0"></canvas><p class="legend"></p>`],
   ["behaviors", "Behaviors: planned and measured", `${what("What the body was to do, and below it what it did.")}<canvas role="img" tabindex="0"></canvas><p class="legend"></p>`],
   ["net", "Petri net", `${what("The plan of what the robot says and does now. A token moves on when all that its instant waits for has happened.")}<div class="choose" role="group" aria-label="Which block"></div><div class="net" tabindex="0" role="group" aria-labelledby="net-title"></div><p class="legend"></p>`],

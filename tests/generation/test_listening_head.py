@@ -1,0 +1,205 @@
+"""The head of a robot among people: whom it looks at while they speak and it is silent."""
+
+import asyncio
+
+import pytest
+
+from engage_hri import perceive
+from engage_hri.schemas.fragments import HeadOwner
+from engage_hri.schemas.recognition import Floor, FloorSpeech
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.robot import Robot, connect
+from engage_hri.services.commandline.embedding import services
+from engage_hri.services.commandline.shell import roster
+from engage_hri.services.commandline.shell.config import load
+from engage_hri.services.runtime.service import running
+from tests.generation.heads import AT, Stage, event, inhibition
+
+PEOPLE = tuple(
+    Entity(id=id, kind="person", position=(1.2, y, 1.2)) for id, y in (("ann", 0.0), ("ben", 0.6), ("cem", -0.6))
+)
+
+
+def company(**config: float) -> Stage:
+    """A robot that has looked at ann for long."""
+    stage = Stage(**config)
+    stage.feed(World(entities=PEOPLE))
+    stage.do(lambda arbiter: arbiter.speak_to("ann"))
+    stage.until(10.0)
+    stage.owners.clear()
+    stage.rule()
+    stage.owners.clear()
+    return stage
+
+
+def speak(stage: Stage, at: float, *actors: str) -> None:
+    """At this time these speak, the first first."""
+    stage.until(at)
+    stage.feed(Floor(at=AT, speeches=tuple(FloorSpeech(actor=each, since=AT) for each in actors)))
+
+
+def asked(stage: Stage, state: str, responder: str = "ann") -> None:
+    stage.feed(event("pair", state, kind="adjacency_pair", initiator="robot", responder=responder, objects=()))
+
+
+def looks(stage: Stage) -> list[tuple[float, str]]:
+    """Where the head was sent, and when."""
+    return [(at, target) for at, _, target in stage.shifts if at >= 10.0]
+
+
+def test_it_looks_at_the_speaker_soon_and_comes_back_after_the_speech() -> None:
+    stage = company()
+    speak(stage, 10.0, "ben")
+    speak(stage, 13.0)
+    stage.until(20.0)
+
+    assert looks(stage) == [(10.6, "ben"), (14.3, "ann")]
+    assert stage.owners[1:] == [(10.6, "response", "ben"), (14.3, "face", "ann")]
+    assert "speech of ben" in {ruling.owner.reason for ruling in stage.rulings}
+
+
+def test_an_uh_huh_draws_nobodys_head() -> None:
+    stage = company()
+    speak(stage, 10.0, "ben")
+    speak(stage, 10.5)
+    stage.until(20.0)
+
+    assert looks(stage) == []
+
+
+def test_of_two_who_speak_at_once_it_stays_with_the_first_and_then_turns_to_the_other() -> None:
+    stage = company()
+    speak(stage, 10.0, "ben")
+    speak(stage, 11.0, "ben", "cem")
+    speak(stage, 12.0, "cem")
+    stage.until(12.5)
+
+    assert looks(stage) == [(10.6, "ben"), (12.0, "cem")]
+
+
+def test_it_goes_from_speaker_to_speaker_without_a_look_elsewhere_in_the_gap() -> None:
+    stage = company()
+    speak(stage, 10.0, "ben")
+    speak(stage, 11.0)
+    speak(stage, 11.3, "cem")
+    speak(stage, 13.0)
+    stage.until(20.0)
+
+    assert looks(stage) == [(10.6, "ben"), (11.9, "cem"), (14.3, "ann")]
+
+
+def test_a_pause_within_a_speech_does_not_send_it_away() -> None:
+    stage = company()
+    speak(stage, 10.0, "ben")
+    speak(stage, 11.0)
+    speak(stage, 11.5, "ben")
+    stage.until(13.0)
+
+    assert looks(stage) == [(10.6, "ben")]
+
+
+def test_while_it_waits_for_an_answer_the_talk_of_others_does_not_draw_it() -> None:
+    stage = company()
+    asked(stage, "started")
+    speak(stage, 10.0, "ben")
+    stage.until(14.0)
+    assert looks(stage) == []
+
+    asked(stage, "succeeded")
+    assert looks(stage) == [(14.0, "ben")]
+
+
+@pytest.mark.parametrize("speakers", [("robot", "ben"), ("ben", "robot")])
+def test_who_speaks_itself_does_not_listen(speakers: tuple[str, ...]) -> None:
+    stage = company()
+    speak(stage, 10.0, *speakers)
+    stage.until(14.0)
+
+    assert looks(stage) == []
+
+
+def test_a_voice_without_a_face_and_one_whose_recognition_has_gone_draw_nobody() -> None:
+    stage = company()
+    speak(stage, 10.0, "dan")
+    stage.until(12.0)
+    assert looks(stage) == []
+
+    speak(stage, 12.0, "ben")
+    stage.until(13.0)
+    stage.do(lambda arbiter: arbiter.recognition_lost())
+    stage.until(20.0)
+    assert looks(stage) == [(12.6, "ben"), (13.3, "ann")]
+
+
+def test_who_leaves_while_speaking_holds_the_head_no_longer() -> None:
+    stage = company()
+    speak(stage, 10.0, "ben")
+    stage.until(11.0)
+    stage.feed(World(entities=PEOPLE[:1]))
+    stage.until(20.0)
+
+    assert stage.owners[-1][1:] == ("face", "ann")
+
+
+def test_an_answer_to_a_look_goes_before_and_an_inhibition_holds_the_head() -> None:
+    stage = company()
+    speak(stage, 10.0, "ben")
+    stage.until(11.0)
+    stage.feed(event("e", "started", initiator="ben", objects=("cup",)))
+    assert looks(stage) == [(10.6, "ben"), (11.0, "cup")]
+    stage.feed(event("e", "failed", initiator="ben", objects=("cup",)))
+    stage.until(12.0)
+    stage.do(lambda arbiter: arbiter.inhibit(inhibition()))
+    stage.until(13.0)
+
+    assert stage.owners[-1][1:] == ("inhibition", "")
+    assert looks(stage) == [(10.6, "ben"), (11.0, "cup"), (11.0, "ben")]
+
+
+def test_it_can_be_switched_off() -> None:
+    stage = company(listens=False)
+    speak(stage, 10.0, "ben")
+    stage.until(14.0)
+
+    assert looks(stage) == []
+
+
+# -- whole robots --------------------------------------------------------------------------------------------------
+
+
+async def owners_from(robot: Robot, seconds: float) -> list[tuple[float, str]]:
+    """Targets of the head in the next seconds, each with the time from now."""
+    began, found = robot.now(), list[tuple[float, str]]()
+    with robot.head_owners() as owners:
+        while (left := began + seconds - robot.now()) > 0 and (told := await owners.next(left)) is not None:
+            assert isinstance(told, HeadOwner)
+            if not found or found[-1][1] != told.owner.target:
+                found.append((robot.now() - began, told.owner.target))
+    return found
+
+
+async def test_a_whole_robot_turns_to_who_speaks_but_not_while_it_waits_for_another_ones_answer(
+    hub: MemoryHub,
+) -> None:
+    config = load(settings=["simulation.human=none"])
+    async with (
+        running(hub, services(config, *roster.ROBOT, "simulation")),
+        connect(hub=hub) as robot,
+        perceive("ann", hub=hub, position=(1.3, 0.4, 1.2)) as ann,
+        perceive("ben", hub=hub, position=(1.3, -0.4, 1.2)) as ben,
+    ):
+        await ann.look_at(ann.robot)
+        asked = {"turn_status": "full", "addressee": "ann", "parts": [{"say": "Ann, which piece is yours?"}]}
+        await robot.perform(asked)
+        talking = asyncio.create_task(ben.say("so I told her that we would be late", to=["ann"], seconds=2.5))
+        assert {target for _, target in await owners_from(robot, 2.5)} == {"ann"}  # she has 4 s
+        await talking
+        await asyncio.sleep(6.0)
+
+        talking = asyncio.create_task(ben.say("and then we missed the train", to=["ann"], seconds=2.5))
+        (_, first), (turned, second), (back, third) = await owners_from(robot, 6.0)
+        await talking
+        assert (first, second, third) == ("ann", "ben", "ann")
+        assert 0.3 <= turned <= 0.8
+        assert 3.0 <= back <= 4.5
