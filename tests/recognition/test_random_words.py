@@ -205,7 +205,12 @@ def expected_words(
         elsewhere = [each[0] for each in others if each[0].id != first.id and is_speech_of(each[0], who)]
         starts = {round(each.started.seconds * 10) for each in elsewhere}
         # What answers the robot's question to somebody else belongs to that.
-        starts |= {round(each.at.seconds * 10) for life in others for each in life if each.answered_by == who}
+        starts |= {
+            round(each.at.seconds * 10)
+            for life in others
+            for each in life
+            if each.answered_by == who and not each.retold
+        }
         own = {at: text for (speaker, at), text in said.items() if speaker == who and at not in starts}
         parts = sorted((at, text) for at, text in own.items() if began <= at <= end)
         return " ".join(text for _, text in parts if text)
