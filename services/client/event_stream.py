@@ -110,8 +110,13 @@ def _is_with(person: str, event: ConnectionEvent) -> bool:
 
 
 def _is_news(event: ConnectionEvent, known: ConnectionEvent) -> bool:
-    """Tell whether a change is later in the event's life than what is known, or has other words in the same place."""
+    """Tell whether a change is later in the event's life than what is known, or has something else in the same place.
+
+    This may be other words, or a request of the robot that has adopted the event.
+    """
     if _progress(event) == _progress(known):
+        if event.block not in ("", known.block):
+            return True
         return event.words != known.words and (event.retold or bool(event.words))
     return _progress(event) > _progress(known)
 
