@@ -1,4 +1,4 @@
-"""How much the head of one person attends to the robot, and where this head points when it does. Pure.
+"""Attention of the head of one person to the robot, and where this head points when it surely attends. Pure.
 
     attending = Attending()
     much = attending.judge(offset, at, is_free=True)
