@@ -112,7 +112,8 @@ def _is_with(person: str, event: ConnectionEvent) -> bool:
 def _is_news(event: ConnectionEvent, known: ConnectionEvent) -> bool:
     """Tell whether a change is later in the event's life than what is known, or has other words in the same place."""
     if _progress(event) == _progress(known):
-        return event.words != known.words and (event.retold or bool(event.words))
+        is_other = (event.initiator, event.responder) != (known.initiator, known.responder)
+        return (is_other and event.retold) or (event.words != known.words and (event.retold or bool(event.words)))
     return _progress(event) > _progress(known)
 
 
