@@ -58,10 +58,12 @@ async def converse(robot: Robot, at_most: int = LINES) -> list[Summary]:
 async def answer(robot: Robot, person: PerceivedPerson) -> None:
     """Answer, a second after the robot has looked up at the end of its turn."""
     await person.look_at(person.robot)
-    answers = iter(ANSWERS)
+    answers, turn = iter(ANSWERS), ""
     with robot.connection_events(person.id, "mutual_facial_gaze") as contacts:
         async for contact in contacts:
-            if contact.state == "started" and contact.cause == "turn" and (words := next(answers, "")):
+            # Her own look at the robot may be the one that its turn asks for: then that event names the turn, too.
+            if contact.turn not in ("", turn) and (words := next(answers, "")):
+                turn = contact.turn
                 await asyncio.sleep(1.0)
                 await person.say(words)
 

@@ -110,10 +110,15 @@ def _is_with(person: str, event: ConnectionEvent) -> bool:
 
 
 def _is_news(event: ConnectionEvent, known: ConnectionEvent) -> bool:
-    """Tell whether a change is later in the event's life than what is known, or has other words in the same place."""
+    """Tell whether a change is later in the event's life than what is known, or has something else in the same place.
+
+    This may be other words, a request of the robot that has adopted the event, or another id of the person.
+    """
     if _progress(event) == _progress(known):
-        is_other = (event.initiator, event.responder) != (known.initiator, known.responder)
-        return (is_other and event.retold) or (event.words != known.words and (event.retold or bool(event.words)))
+        people, were = (event.initiator, event.responder), (known.initiator, known.responder)
+        if event.block not in ("", known.block) or (event.retold and people != were):
+            return True
+        return event.words != known.words and (event.retold or bool(event.words))
     return _progress(event) > _progress(known)
 
 

@@ -1,4 +1,4 @@
-"""What recognition keeps of its life for the next one: its last states, in a file.
+"""The last states of one life of recognition, kept in a file for the next one.
 
 States on the bus end with the process that told them, so that nobody could give them back to it (decision 0183).
 """

@@ -193,7 +193,7 @@ class Coder:
 
         following: when the next sign begins.
         """
-        if turn.kind != "asks" or speech.known is None or speech.seconds > WORDS_WAIT + ROUND:
+        if speech.known is None or speech.seconds > WORDS_WAIT + ROUND:
             return False
         return following < speech.known or speech.known[0] > speech.since[0] + WORDS_WAIT + ROUND
 
@@ -228,9 +228,10 @@ class Coder:
 
     def _interrupts(self, speech: Span, turn: Turn) -> bool:
         """True if a speech that is over within the robot's turn takes the floor."""
-        if speech.known is not None and speech.known < turn.until and turn.kind == "asks":
+        is_open = turn.kind == "asks" or speech.seconds <= WORDS_WAIT + ROUND
+        if speech.known is not None and speech.known < turn.until and is_open:
             return speech.words not in LISTENING
-        return speech.seconds > (WORDS_WAIT if self._timeline.is_worded and turn.kind == "asks" else BRIEF) + ROUND
+        return speech.seconds > (WORDS_WAIT if self._timeline.is_worded else BRIEF) + ROUND
 
     # -- the person -----------------------------------------------------------------------------------------------
 

@@ -114,6 +114,8 @@ class GazeCoder:
         self._found: list[Gazed] = []
         self._answers: set[float] = set()
         """When looks have answered the robot's."""
+        self._adopted: set[float] = set()
+        """Requests that met an event that went on."""
         self._directed: list[tuple[float, float, str, str]] = []
         """Directed gazes: when each was recognized and over, who began it, and its object."""
 
@@ -151,7 +153,8 @@ class GazeCoder:
         begins += [(each.at, each) for each in self._requests if each.kind == "directed_gaze"]
         for at, what in sorted(begins, key=lambda each: (round(each[0], 6), isinstance(each[1], Look))):
             if isinstance(what, Request):
-                self._robot_directs(what)
+                if what.at not in self._adopted:
+                    self._robot_directs(what.target, what.at, what.at)
             elif not self._is_answer(what, at):
                 self._human_directs(what, at)
 
@@ -164,103 +167,125 @@ class GazeCoder:
                 return True
         return False
 
-    def _next_request(self, target: str, after: float) -> float:
-        asked = (each.at for each in self._requests if each.kind == "directed_gaze" and each.target == target)
-        return min((at for at in asked if at > after), default=NEVER)
+    def _asks(self, target: str, after: float) -> list[float]:
+        """When the robot asks for a gaze there later. target: HUMAN: a mutual one."""
+        return [each.at for each in self._requests if each.target == target and each.at > after]
 
     def _human_directs(self, look: Look, known: float) -> None:
-        limit, asks = look.since + DIRECTED_LIMIT, self._next_request(look.target, known)
-        there = self._on(self._robot, look.target, known)
-        comes = max(there.since, look.since) if there is not None else self._comes(self._robot, look.target, known)
-        over = min(limit, asks)
-        if there is not None or (comes <= limit + ROUND and comes < asks):
-            self._note("directed_gaze", HUMAN, look.since, look.target, "succeeded", comes - look.since)
-            over = self._part(look.target, max(comes, known), asks)
-        else:
-            state = "failed" if limit < asks else "superseded"
-            self._note("directed_gaze", HUMAN, look.since, look.target, state)
-        self._directed.append((known, over, HUMAN, look.target))
+        limit, target = look.since + DIRECTED_LIMIT, look.target
+        there = self._on(self._robot, target, known)
+        comes = max(there.since, look.since) if there is not None else self._comes(self._robot, target, known)
+        if there is not None or comes <= limit + ROUND:
+            self._note("directed_gaze", HUMAN, look.since, target, "succeeded", comes - look.since)
+            over = self._part(target, max(comes, known), [])
+            self._adopts(target, known, over)
+            self._directed.append((known, over, HUMAN, target))
+            return
+        self._note("directed_gaze", HUMAN, look.since, target, "failed")
+        self._directed.append((known, limit, HUMAN, target))
+        if asked := self._adopts(target, known, limit):
+            for at in asked[:-1]:
+                self._note("directed_gaze", ROBOT, at, target, "superseded")
+            self._robot_directs(target, asked[-1], limit)
 
-    def _robot_directs(self, asked: Request) -> None:
-        at, target = asked.at, asked.target
-        limit, asks = at + DIRECTED_LIMIT, self._next_request(target, at)
-        comes = at if self._on(self._human, target, at) else self._comes(self._human, target, at)
-        over = min(limit, asks)
-        if comes <= limit + ROUND and comes < asks:
+    def _adopts(self, target: str, since: float, until: float) -> list[float]:
+        """Requests that meet an event that goes on: they are about it."""
+        asked = [at for at in self._asks(target, since) if at < until]
+        self._adopted |= {*asked}
+        return asked
+
+    def _robot_directs(self, target: str, at: float, begins: float) -> None:
+        """Read a direction of the robot. begins: when the person's event is over, which it met; or when it asked."""
+        limit, asks = at + DIRECTED_LIMIT, self._asks(target, begins)
+        comes = begins if self._on(self._human, target, begins) else self._comes(self._human, target, begins)
+        next_asked = min(asks, default=NEVER)
+        over = min(max(limit, begins), next_asked)
+        if comes <= max(limit, begins) + ROUND and comes < next_asked:
             self._note("directed_gaze", ROBOT, at, target, "succeeded", comes - at)
-            over = self._part(target, comes, asks, begun=at)
+            over = self._part(target, comes, asks, begun=begins)
         else:
-            self._note("directed_gaze", ROBOT, at, target, "failed" if limit < asks else "superseded")
-        self._directed.append((at, over, ROBOT, target))
+            self._note("directed_gaze", ROBOT, at, target, "failed" if limit < next_asked else "superseded")
+        self._directed.append((begins, over, ROBOT, target))
 
-    def _part(self, target: str, at: float, asks: float, begun: float | None = None) -> float:
+    def _part(self, target: str, at: float, asks: list[float], begun: float | None = None) -> float:
         """When the shared phase is over. begun: the robot's request, if it began; its gaze may follow."""
-        human, robot = self._on(self._human, target, at), self._on(self._robot, target, at)
+        face = ROBOT if target == HUMAN else target
+        human, robot = self._on(self._human, face, at), self._on(self._robot, target, at)
         if human is None:
             return at
-        if robot is not None:
-            return min(human.until, robot.until, asks)
+        ends = min(human.until, self._directs(at) if target == HUMAN else NEVER)
         had_come = begun is not None and any(
-            each.target == target and each.until > begun and each.since <= at for each in self._robot
+            each.target == target and each.until > begun and each.since < at for each in self._robot
         )
-        if begun is None or had_come:
-            return at
-        comes = self._comes(self._robot, target, at)
-        if comes >= min(human.until, asks):
-            return min(human.until, asks)
-        there = self._on(self._robot, target, comes)
-        return min(human.until, asks, NEVER if there is None else there.until)
+        if robot is not None and robot.since == at == human.since and had_come:
+            return at  # it had left, and comes back when the person has been there
+        if robot is None:
+            if begun is None or had_come:
+                return at
+            comes = self._comes(self._robot, target, at)
+            ends = min(ends, min((each for each in asks if at < each < comes), default=NEVER))
+            if comes >= ends:
+                return ends
+            robot, at = self._on(self._robot, target, comes), comes
+        over = min(ends, NEVER if robot is None else robot.until)
+        self._adopts(target, at, over)
+        return over
 
     # -- mutual facial gaze -------------------------------------------------------------------------------------
 
     def _mutual_gazes(self) -> None:
         looks = [(each.since, HUMAN, each.until) for each in self._human if each.target == ROBOT]
-        asked = [(each.at, ROBOT, NEVER) for each in self._requests if each.kind == "mutual_facial_gaze"]
+        asked = [(at, ROBOT, NEVER) for at in self._asks(HUMAN, 0.0)]
         over = -1.0
         for at, who, until in sorted([*looks, *asked]):
-            asks = min((each[0] for each in asked if each[0] > at), default=NEVER)
-            if who == ROBOT:
-                over = self._robot_looks(at, asks)
-            elif over <= at and at not in self._answers:
-                over = self._human_looks(at, until, asks)
+            if who == ROBOT and at not in self._adopted:
+                over = self._robot_looks(at, at)
+            elif who == HUMAN and over <= at and at not in self._answers:
+                over = self._human_looks(at, until)
 
-    def _human_looks(self, at: float, until: float, asks: float) -> float:
+    def _human_looks(self, at: float, until: float) -> float:
         limit = at + FACIAL_LIMIT
         comes = at if self._on(self._robot, HUMAN, at) else self._comes(self._robot, HUMAN, at)
-        first = min(limit, until, asks)
-        if comes <= limit + ROUND and comes < min(until, asks):
+        is_met = comes <= limit + ROUND and comes < until
+        over = comes if is_met else min(limit, until)
+        waiting: float | None = None
+        for asked in self._adopts(HUMAN, at, over):
+            if waiting is not None:
+                is_withdrawn = self._directs(waiting, by=ROBOT) < asked
+                self._note("mutual_facial_gaze", ROBOT, waiting, "", "withdrawn" if is_withdrawn else "superseded")
+            waiting = asked
+        if waiting is not None and self._directs(waiting, by=ROBOT) < over:
+            self._note("mutual_facial_gaze", ROBOT, waiting, "", "withdrawn")
+            waiting = None
+        if is_met:
             self._note("mutual_facial_gaze", HUMAN, at, "", "succeeded", comes - at)
-            return self._mutual_until(comes, asks)
-        self._note("mutual_facial_gaze", HUMAN, at, "", "superseded" if first == asks else "failed")
-        return first
+            return self._part(HUMAN, comes, [])
+        self._note("mutual_facial_gaze", HUMAN, at, "", "failed")
+        return over if waiting is None else self._robot_looks(waiting, over)
 
-    def _robot_looks(self, at: float, asks: float) -> float:
-        limit = at + FACIAL_LIMIT
-        comes = at if self._on(self._human, ROBOT, at) else self._comes(self._human, ROBOT, at)
-        there = self._on(self._robot, HUMAN, at) or self._on(self._robot, HUMAN, self._comes(self._robot, HUMAN, at))
+    def _robot_looks(self, at: float, begins: float) -> float:
+        """Read a request of the robot. begins: when the person's event is over, which it met; or when it asked."""
+        limit, asks = max(at + FACIAL_LIMIT, begins), self._asks(HUMAN, begins)
+        comes = begins if self._on(self._human, ROBOT, begins) else self._comes(self._human, ROBOT, begins)
+        there = self._on(self._robot, HUMAN, begins) or self._on(
+            self._robot, HUMAN, self._comes(self._robot, HUMAN, begins)
+        )
         leaves = NEVER if there is None else there.until
-        directs = self._directs(at, by=ROBOT)
-        if comes <= limit + ROUND and comes < min(asks, directs) and comes <= leaves:
+        directs, next_asked = self._directs(begins, by=ROBOT), min(asks, default=NEVER)
+        if comes <= limit + ROUND and comes < min(next_asked, directs) and comes <= leaves:
             self._note("mutual_facial_gaze", ROBOT, at, "", "succeeded", comes - at)
             self._answers.add(comes)
-            return self._mutual_until(comes, asks, begun=at)
-        first = min(limit, leaves, asks, directs)
-        state = "superseded" if first == asks else "failed" if first == limit else "withdrawn"
+            return self._part(HUMAN, comes, asks, begun=begins)
+        first = min(limit, leaves, next_asked, directs)
+        state = "superseded" if first == next_asked else "failed" if first == limit else "withdrawn"
         self._note("mutual_facial_gaze", ROBOT, at, "", state)
         return first
 
     def _directs(self, after: float, by: str = "") -> float:
-        """When the next directed gaze is recognized."""
-        return min((known for known, _, who, _ in self._directed if known > after and by in ("", who)), default=NEVER)
-
-    def _mutual_until(self, at: float, asks: float, begun: float | None = None) -> float:
-        human, robot = self._on(self._human, ROBOT, at), self._on(self._robot, HUMAN, at)
-        ends = min(asks, self._directs(at), NEVER if human is None else human.until)
-        if robot is None and begun is not None:  # its gaze may still come
-            robot = self._on(self._robot, HUMAN, self._comes(self._robot, HUMAN, at))
-            if robot is None or robot.since >= ends:
-                return ends
-        return min(ends, NEVER if robot is None else robot.until)
+        """When the next directed gaze is recognized, or asked for by the robot."""
+        asked = [each.at for each in self._requests if each.kind == "directed_gaze"]
+        known = [] if by == ROBOT else [known for known, _, who, _ in self._directed if who == HUMAN]
+        return min((at for at in (*asked, *known) if at > after), default=NEVER)
 
 
 def differences(seed: int) -> tuple[int, list[str]]:

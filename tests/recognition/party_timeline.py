@@ -3,14 +3,15 @@
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, Utterance
 from engage_hri.services.recognition.config import RecognitionConfig
 from tests.recognition.coder import Coder, as_told, only_one_has, rounded
+from tests.recognition.observations import ROBOT
 from tests.recognition.timeline import LISTENING, OTHER, Instant, Span, Timeline, Turn
 from tests.simulation.party_play import Play
 
 LASTS = 180.0
 JUDGED = 160.0
 """What begins later may not be decided when the play is over."""
-BEFORE, AFTER = -1, 10**6
-"""Places in the order of what happens at one time: the robot's turns come before all else, words last."""
+BEFORE, VOICE, AFTER = -1, 10**5, 10**6
+"""Places in the order of what happens at one time: the robot's turns, nods, voices, words."""
 
 
 def timeline(play: Play) -> Timeline:
@@ -21,10 +22,11 @@ def timeline(play: Play) -> Timeline:
     known: dict[tuple[str, float], float] = {}
     for number, told in enumerate(play.messages):
         match told:
-            case ActionBegan(action="look", targets=(target, *_)):
-                attended[told.actor] = target
+            case ActionBegan(action="look", targets=targets):
+                # Nobody tells to whom a nod is: of who looks at nobody it is to the robot, as the page has it.
+                attended[told.actor] = targets[0] if targets else ROBOT
             case ActionBegan(action="nod"):
-                nods[told.actor] = (told.at.seconds, number), attended.get(told.actor, "")
+                nods[told.actor] = (told.at.seconds, number), attended.get(told.actor, ROBOT)
             case ActionEnded(action="nod") if told.actor in nods:
                 since, to = nods.pop(told.actor)
                 found.spans.append(Span(told.actor, "nod", since, (told.at.seconds, number), to))
@@ -32,7 +34,7 @@ def timeline(play: Play) -> Timeline:
                 known[told.actor, round(told.began.seconds, 4)] = told.at.seconds
     for said in play.said:
         words = LISTENING[0] if said.kind == "feedback" else OTHER[0] if said.words else ""
-        speech = Span(said.actor, "speak", (said.began, 0), (said.ended, 0), said.to, words)
+        speech = Span(said.actor, "speak", (said.began, VOICE), (said.ended, VOICE), said.to, words)
         if words and (at := known.get((said.actor, round(said.began, 4)))) is not None:
             speech.known = at, AFTER
         found.spans.append(speech)

@@ -204,11 +204,13 @@ def expected_words(
         end = 10**9 if decision is None else round(decision.at.seconds * 10)
         elsewhere = [each[0] for each in others if each[0].id != first.id and is_speech_of(each[0], who)]
         starts = {round(each.started.seconds * 10) for each in elsewhere}
+        # What answers the robot's question to somebody else belongs to that.
+        starts |= {round(each.at.seconds * 10) for life in others for each in life if each.answered_by == who}
         own = {at: text for (speaker, at), text in said.items() if speaker == who and at not in starts}
         parts = sorted((at, text) for at, text in own.items() if began <= at <= end)
         return " ".join(text for _, text in parts if text)
     answered = next((change for change in life if change.response == "speak"), None)
-    if answered is None or answered.delay is None:
+    if answered is None or answered.delay is None or answered.answered_by not in ("", who):
         return ""
     turn_end = answered.at.seconds - max(0.0, answered.delay)
     if answered.state == "failed":  # a late answer may be known later still: only the limit tells when the turn ended

@@ -274,7 +274,9 @@ class Session:
                 listens = self.scene.is_listening(began.behavior)
                 self._say(began, at, lambda talk: talk.robot_gestures(began.action, at, listens=listens))
                 if began.action == "point":
-                    self._people.apply_to_all(at, lambda person: person.robot_points(began.targets, at))
+                    self._people.apply_to_all(
+                        at, lambda person: person.robot_points(began.targets, at), lambda person: person.directed
+                    )
 
     def _robot_speaks(self, began: ActionBegan, at: Seconds) -> None:
         self.scene.speaks(self.robot)

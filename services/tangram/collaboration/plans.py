@@ -30,6 +30,8 @@ ARRIVAL: Seconds = 4.0
 """Time from when a person is seen until the robot greets them, so that they can sit down. Ours."""
 FAREWELL: Seconds = 15.0
 """Time that the robot waits for the person to leave after its goodbye. Ours."""
+GONE: Seconds = 2.5
+"""Time from a person's leaving until recognition has ended all that was open with them: they might have come back."""
 PATIENCE: Seconds = 2.0
 """Time that the robot waits for a hand to go away before it judges what lies where. Ours."""
 SETTLE: Seconds = 0.75
@@ -215,6 +217,7 @@ class Manager:
 
     def farewell(self) -> Plan[None]:
         yield AwaitDeparture(FAREWELL)
+        yield Pause(GONE)
 
     def _request(self, id: str, instruction: Instruction, how: str) -> TurnFragment:
         """how: key of `ASKING`. Whoever is helped is shown the place, too."""
