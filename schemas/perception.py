@@ -41,10 +41,15 @@ class ActionEnded(Struct, frozen=True, kw_only=True, tag="action_ended", omit_de
 
 
 class ActorFound(Struct, frozen=True, kw_only=True, tag="actor_found", omit_defaults=True):
-    """evt: perception sees this person, for the first time or again."""
+    """evt: perception sees this person, for the first time or again.
+
+    same_as: another id that it has told of, of the same person: it has found out so. Events of both are told under
+    that one from now on, and those of before once more.
+    """
 
     actor: str
     at: Stamp
+    same_as: str = ""
 
 
 class ActorLost(Struct, frozen=True, kw_only=True, tag="actor_lost", omit_defaults=True):

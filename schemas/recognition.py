@@ -70,8 +70,8 @@ class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event",
     words: str = ""
     """Words of the person that opened or answered the event, as far as they are known."""
     retold: bool = False
-    """True: the event came to this state before. Since then `words` have become known or were corrected, or a failed
-    pair was answered late (`response`)."""
+    """True: the event came to this state before. Since then `words` have become known or were corrected, a failed
+    pair was answered late (`response`), or the person is known by another id (`initiator`, `responder`)."""
 
     def person(self, robot: str) -> str:
         """Actor id of the person who takes part in it. robot: the robot's own actor id."""

@@ -92,7 +92,7 @@ def _turn(message: TurnClosed) -> Entry:
 
 def _event(message: ConnectionEvent) -> Entry:
     if message.retold:
-        return DEBUG, f"event {message.id}: its words are known"
+        return DEBUG, f"event {message.id}: told again, of {message.initiator} and {message.responder}, words and all"
     level = INFO if message.state == "succeeded" or message.state in ENDINGS - {"completed"} else DEBUG
     delay = "" if message.delay is None else f" after {_seconds(message.delay)}"
     about = f" about {', '.join(message.objects)}" if message.objects else ""

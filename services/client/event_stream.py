@@ -112,10 +112,11 @@ def _is_with(person: str, event: ConnectionEvent) -> bool:
 def _is_news(event: ConnectionEvent, known: ConnectionEvent) -> bool:
     """Tell whether a change is later in the event's life than what is known, or has something else in the same place.
 
-    This may be other words, or a request of the robot that has adopted the event.
+    This may be other words, a request of the robot that has adopted the event, or another id of the person.
     """
     if _progress(event) == _progress(known):
-        if event.block not in ("", known.block):
+        people, were = (event.initiator, event.responder), (known.initiator, known.responder)
+        if event.block not in ("", known.block) or (event.retold and people != were):
             return True
         return event.words != known.words and (event.retold or bool(event.words))
     return _progress(event) > _progress(known)

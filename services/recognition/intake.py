@@ -12,6 +12,8 @@ from collections.abc import Iterable
 from math import inf, isnan
 from typing import TypeGuard, get_args
 
+from msgspec.structs import replace
+
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import BlockProgress, SyncPointProgress
 from engage_hri.schemas.body import RobotState
@@ -45,11 +47,13 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import FORGOTTEN_AFTER
 from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.machine import Mishap, PersonForgotten
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
 from engage_hri.services.recognition.events.scene import Worded
 from engage_hri.services.recognition.perceive.clock_errors import ClockErrors
 from engage_hri.services.recognition.perceive.clock_restarts import ClockRestarts
+from engage_hri.services.recognition.perceive.identities import AnyStruct, Identities, Join
 from engage_hri.services.recognition.perceive.words import TimedWords
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
@@ -74,6 +78,8 @@ _CONTENT = get_args(Content)
 _News = ActionBegan | ActionEnded | ActorFound | ActorLost | HeadPose | VoiceActivity | Utterance
 """Messages that tell of what has just happened."""
 
+EVENTS_KEPT = 64
+"""Number of events that are told again if the person turns out to be another."""
 COMPLAINTS = 100
 """Number of bad ids that are reported as faults."""
 
@@ -97,6 +103,9 @@ class Intake:
         self._reports = ActionReports(robot, REPORT_GRACE, clock.name, self._instant)
         self._clock_errors = ClockErrors(robot)
         self._restarts = ClockRestarts()
+        self._identities = Identities(robot)
+        self._told: Latest[str, ConnectionEvent] = Latest(EVENTS_KEPT)
+        """The latest events, each as it was last told, by id. Of people who are joined they are told again."""
         self._former_until: Seconds = -inf
         """Time until which a former life has told all events, as far as is known."""
         self._source = ""
@@ -138,7 +147,10 @@ class Intake:
             if isinstance(message, _News) and not input.past:
                 told = self._clock.local(message.at, now)
                 self._restarts.hear(input.source, message.at, now if isnan(told) else told, now)
-            self._tell(self._reports.take(message, input.key, input.source, input.life, now, past=input.past))
+            message, key = self._identify(message, input.at), input.key
+            if isinstance(message, OngoingActions) and message is not input.message:
+                key = keys.perceived_ongoing(keys.reporter_of(key), message.actor)
+            self._tell(self._reports.take(message, key, input.source, input.life, now, past=input.past))
             if isinstance(message, Utterance):
                 self._hear(message)
             elif not isinstance(message, Read):
@@ -161,6 +173,53 @@ class Intake:
                 if isinstance(effect, ConnectionEvent):
                     self._statistics.resume_event(effect)
             self._note(effects)
+
+    def _identify(self, message: AnyStruct, at: Seconds) -> AnyStruct:
+        """Find out who those are of whom a message tells. Returns it with the ids by which they are known.
+
+        at: time at which the message came.
+        """
+        if isinstance(message, ActorFound | ActorLost | HeadPose | World):
+            for join in self._identities.take(message, self._when(message, at)):
+                self._join(join)
+        return self._identities.inward(message)
+
+    def _join(self, join: Join) -> None:
+        """Take two people for one.
+
+        The person who has come last goes on, and the other is forgotten, unless nothing is open with the newer and
+        the former has hardly gone.
+        """
+        session, newer, former, now = self._recognizer.session, join.newer, join.former, self._now
+        before = session.persons.get(former)
+        is_here = before is not None and before.presence.here
+        goes_on = newer not in session.persons or (is_here and not session.has_open_event(newer))
+        kept, other = (former, newer) if goes_on else (newer, former)
+        names = {self._identities.name(kept), self._identities.name(other)} - {join.name}
+        self._identities.join(kept, other, join.name)
+        self._tell_again(names, join.name)
+        if kept != other:
+            going = self._reports.join(other, kept)
+            self._note(self._recognizer.join(other, kept, now))
+            for each in going:
+                self._feed(each, now)
+
+    def _tell_again(self, names: set[str], name: str) -> None:
+        """Tell what was told of a person by other names by this one, as far as it is remembered."""
+        at, out = Stamp(self._clock.name, self._now), self._outputs
+        for id, before in tuple(self._told.items()):
+            if before.person(self._robot) in names:
+                event = self._told[id] = self._identities.outward(
+                    replace(self._identities.inward(before), at=at, retold=True)
+                )
+                out.append(PublishMessage(keys.connection_event(name, event.kind), event))
+        for other in sorted(names):
+            for message in self._open_events.join(other, name, at):
+                out.append(PublishMessage(keys.open_events(message.actor), message))
+            self._statistics.join(other, name)
+            states = (keys.open_events(other), *([keys.statistics(other)] if other != "all" else []))
+            out.append(WithdrawStates(states))
+        self._note(())
 
     def _take(self) -> list[Output]:
         outputs, self._outputs = self._outputs, []
@@ -192,6 +251,8 @@ class Intake:
     def _is_credible(self, input: Input[Content]) -> bool:
         """True if the message came from its proper sender: the robot's body for the robot, perception for people."""
         match input.message:
+            case ActorFound(same_as=former) if former == self._robot or (former and not self._has_valid_id(former)):
+                return False
             case ActionBegan() | ActionEnded() | ActorFound() | ActorLost() as event:
                 return self._has_valid_id(event.actor)
             case Utterance(actor=actor):
@@ -252,6 +313,7 @@ class Intake:
         told = [
             FloorSpeech(actor=who, since=Stamp(name, at), to=tuple(sorted(to))) for who, at, to in session.floor()
         ]
+        told = [self._identities.outward(each) for each in told]
         floor = Floor(at=Stamp(name, self._now), speeches=tuple(told))
         if floor.speeches != self._floor.speeches:
             self._floor = floor
@@ -264,20 +326,23 @@ class Intake:
         for result in results:
             match result:
                 case ConnectionEvent():
-                    result = self._clock_errors.marked(result)
+                    self._told[result.id] = result = self._identities.outward(self._clock_errors.marked(result))
                     changes.append(result)
                     out.append(PublishMessage(keys.connection_event(result.person(self._robot), result.kind), result))
-                case Interjection(actor=actor):
-                    out.append(PublishMessage(keys.interjection(actor), result))
+                case Interjection():
+                    result = self._identities.outward(result)
+                    out.append(PublishMessage(keys.interjection(result.actor), result))
                 case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
-                    out.append(PublishMessage(keys.RECOGNIZED_ACTION, result))
+                    out.append(PublishMessage(keys.RECOGNIZED_ACTION, self._identities.outward(result)))
                 case Accepted() | Refused() | TurnOutcome():
                     out.append(AnswerRequest(result))
                 case EventOutcome():
                     out.append(AnswerRequest(self._clock_errors.marked_as(result, changes)))
                 case PersonForgotten(actor=actor):
-                    changes.append(result)
                     self._reports.forget(actor)
+                    if not self._identities.is_other(actor):
+                        changes.append(PersonForgotten(self._identities.name(actor)))
+                        self._identities.forget(actor)
                 case Mishap(actor=actor, error=error):
                     out.append(TellMistake(error, f"what {actor or 'somebody'} does", request))
         self._tell_floor()
@@ -285,7 +350,9 @@ class Intake:
         for message in self._open_events.feed(events, Stamp(self._clock.name, self._now)):
             out.append(PublishMessage(keys.open_events(message.actor), message))
         counted = [change for change in changes if isinstance(change, PersonForgotten) or not change.retold]
-        busy, contacts = self._recognizer.session.busy, self._recognizer.contacts()
+        name = self._identities.name
+        busy = {name(id) for id in self._recognizer.session.busy}
+        contacts = {name(id): much for id, much in self._recognizer.contacts().items()}
         self._statistics.feed(counted, busy, self._now, contacts)
         for statistics in self._statistics.told(self._now):
             if statistics.actor != "all":  # a person with this id would be taken for everybody

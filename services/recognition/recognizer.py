@@ -24,6 +24,7 @@ from engage_hri.services.recognition.events.machine import Effect, Mishap, Perso
 from engage_hri.services.recognition.events.scene import Covered
 from engage_hri.services.recognition.events.session import SETTLING, Observation, Session
 from engage_hri.services.recognition.perceive.attention import Attention
+from engage_hri.services.recognition.perceive.identities import renamed
 from engage_hri.services.recognition.perceive.words import TimedWords, Words
 from engage_hri.services.reports.ongoing_actions import GoesOn
 
@@ -134,6 +135,18 @@ class Recognizer:
             id: [each for each in (much, self._heads.get(id)) if each is not None] for id, much in changed.items()
         }
         return {id: max(much) for id, much in known.items() if much}
+
+    def join(self, other: str, kept: str, at: Seconds) -> list[Result]:
+        """Take two persons for one, who is `kept` from now on: see `Session.join`."""
+        self._attention.forget(other)
+        self._interrupted.forget(other)
+        self._words.forget(other)
+
+        def name(id: str) -> str:
+            return kept if id == other else id
+
+        self._waiting = [(when, number, renamed(waiting, name)) for when, number, waiting in self._waiting]
+        return self._told([*self.session.join(other, kept, at)])
 
     def lose_track(self, person: str, at: Seconds) -> list[Result]:
         """Begin anew with this person after a failure: see `Session.lose_track`."""

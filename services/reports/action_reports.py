@@ -333,6 +333,14 @@ class ActionReports:
             and actor in other.reports
         ]
 
+    def join(self, other: str, kept: str) -> list[GoesOn]:
+        """Take two persons for one, who is `kept` from now on. Returns what the other does."""
+        going: list[GoesOn] = []
+        for one in self._reporters.values():
+            if (report := one.reports.pop(other, None)) is not None:
+                going += self._report(one, kept).join(report, kept)
+        return going
+
     def forget(self, actor: str) -> None:
         """Drop a person who has been gone for long from all reporters."""
         for name, one in tuple(self._reporters.items()):

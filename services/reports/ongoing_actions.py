@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.messages import Message
@@ -219,6 +220,14 @@ class Report:
     def going(self) -> list[GoesOn]:
         """List what goes on, for a session that has been told that it had ended."""
         return [GoesOn(action, self._local(action.at)) for action in self.actions]
+
+    def join(self, other: "Report", actor: str) -> list[GoesOn]:
+        """Take over what goes on by the report of another id of the same person. Returns it, as this person's."""
+        going = [GoesOn(replace(one.began, actor=actor), one.since) for one in other.going()]
+        for one in going:
+            self._ongoing.take(one.began)
+        self._ongoing.seen = self.seen or other.seen
+        return going
 
     def ends(self, is_over: Callable[[ActionBegan], bool]) -> list[ActionEnded]:
         """List the ends of what goes on, if `is_over`."""

@@ -230,6 +230,10 @@ class EventWriter:
         texts = (self._texts.get((actor, speech), "") for speech in event.spoken for actor in pair)
         return " ".join(filter(None, texts))
 
+    def has_open(self, person: str) -> bool:
+        """True if an event with `person` is open."""
+        return any(person in (event.initiator, event.responder) for event in self._open.values())
+
     def lose(self, person: str, at: Seconds) -> None:
         """End the open events with `person` as lost."""
         for event in [event for event in self._open.values() if person in (event.initiator, event.responder)]:

@@ -33,3 +33,20 @@ class OpenEventTracker:
             OpenEvents(actor=person, session=self._session, at=at, events=events)
             for person, events in sorted(touched.items())
         ]
+
+    def join(self, other: str, kept: str, at: Stamp) -> list[OpenEvents]:
+        """Tell the open events of a person as those of `kept`. Returns both messages if there are any. at: now."""
+        if other not in self._open:
+            return []
+        person = {other: kept}
+        moved = {
+            id: replace(
+                event,
+                initiator=person.get(event.initiator, event.initiator),
+                responder=person.get(event.responder, event.responder),
+            )
+            for id, event in self._open.pop(other).items()
+        }
+        events = self._open[kept] = {**self._open.get(kept, {}), **moved}
+        told = {kept: tuple(events.values()), other: ()}
+        return [OpenEvents(actor=id, session=self._session, at=at, events=each) for id, each in told.items()]

@@ -75,17 +75,37 @@ class People:
             id, since = next(iter(self._unseen.items()))
             if since + FORGOTTEN_AFTER > now:
                 return
-            person = self.persons[id]
-            if person.presence.here:
-                person.presence.vanish(since)
-                self._apply(person, now, lambda person: person.leave(now))
-            self.agenda.clear(id)
-            self._here.pop(id, None)
-            self._scene.forget_person(id)
-            self.touched.discard(id)
-            del self.persons[id], self._unseen[id]
-            self._writer.effects.append(PersonForgotten(id))
-            self._follow(now)
+            self._drop(id, since, now)
+
+    def _drop(self, id: str, since: Seconds, now: Seconds) -> None:
+        """Forget a person who was last seen at `since`."""
+        person = self.persons[id]
+        if person.presence.here:
+            person.presence.vanish(since)
+            self._apply(person, now, lambda person: person.leave(now))
+        self.agenda.clear(id)
+        self._here.pop(id, None)
+        self._unseen.pop(id, None)
+        self._scene.forget_person(id)
+        self.touched.discard(id)
+        del self.persons[id]
+        self._writer.effects.append(PersonForgotten(id))
+        self._follow(now)
+
+    def join(self, other: str, kept: str, at: Seconds) -> None:
+        """Take two persons for one, who is `kept` from now on. What is open with the other is lost."""
+        before = self.persons.get(other)
+        if before is None:
+            return
+        self.lose_track(before, at)
+        is_found = before.presence.here and before.presence.reported
+        self._drop(other, at, at)
+        self._scene.join(other, kept)
+        gazes = [self._scene.gaze, *(person.gaze for person in self.persons.values())]
+        for gaze in gazes:
+            gaze.targets = tuple(kept if target == other else target for target in gaze.targets)
+        if is_found:
+            self.observe(kept, at, lambda person: person.presence.found(at))
 
     def lose_track(self, person: PersonRecognition, at: Seconds) -> None:
         """Begin anew with a person: its open events end as lost, and its actions have to be observed again."""

@@ -207,6 +207,11 @@ class SessionScene:
         self.worded.discard(person)
         self.names = {name: id for name, id in self.names.items() if id != person}
 
+    def join(self, other: str, kept: str) -> None:
+        """Take a person who is in the world for `kept`."""
+        if other in self.people_in_world:
+            self.people_in_world = self.people_in_world - {other} | {kept}
+
     def is_face(self, target: str) -> bool:
         """True if a look at `target` is one at the face of a person or of the robot."""
         return target == self.robot or target in self.present

@@ -225,6 +225,16 @@ class Session:
             self._lose_untold(person, at)
         return self._take()
 
+    def join(self, other: str, kept: str, at: Seconds) -> list[Effect]:
+        """Take two persons for one, who is `kept` from now on. What is open with the other is lost."""
+        self._people.join(other, kept, at)
+        self._lose_untold(other, at)
+        return self._take()
+
+    def has_open_event(self, person: str) -> bool:
+        """True if an event is open with this person."""
+        return self._writer.has_open(person)
+
     def _lose_untold(self, person: str, at: Seconds) -> None:
         """End the events that were asked for and not begun yet: a bug has shown before, or while they waited."""
         for event in list(self._live.values()):

@@ -202,13 +202,23 @@ class Attention:
         else:
             self._attended.pop(id, None)
 
+    def forget(self, id: str) -> None:
+        """Forget an actor, with what goes on."""
+        if id in self._actors:
+            self._manipulation.lose(id)
+            self._mentioned.comes(id)
+            self._drop(id)
+
     def _forget(self, now: Seconds) -> None:
         """Forget actors who have not been observed for long, as the session does."""
         for id in self._mentioned.forgotten(now):
-            del self._actors[id]
-            self._attended.pop(id, None)
-            self.attended.pop(id, None)
-            self._gaze_targets.forget_face(id)
+            self._drop(id)
+
+    def _drop(self, id: str) -> None:
+        del self._actors[id]
+        self._attended.pop(id, None)
+        self.attended.pop(id, None)
+        self._gaze_targets.forget_face(id)
 
     # -- one person ---------------------------------------------------------------------------------------------
 

@@ -109,6 +109,19 @@ class PublishedStatistics:
         one.is_new = True
         self._changed.add(name)
 
+    def join(self, other: str, kept: str) -> None:
+        """Count the events of a person as those of `kept`, too. The estimate goes on from the one that is newer."""
+        if other not in self._actors:
+            return
+        one = self._actors.pop(other)
+        self._agenda.clear(other)
+        self._changed.discard(other)
+        if kept in self._actors:
+            one.tally.join(self._actors[kept].tally)
+        self._actors[kept] = one
+        one.is_new = one.is_urgent = True
+        self._changed.add(kept)
+
     def resume_event(self, event: ConnectionEvent) -> None:
         """Take an event that goes on from a former life, which has counted its start."""
         for name in (event.person(self._robot), EVERYBODY):

@@ -44,6 +44,13 @@ class Spread(Struct):
     def mean(self) -> Seconds | None:
         return self.sum / self.number if self.number else None
 
+    def join(self, other: "Spread") -> None:
+        """Add the delays of another."""
+        self.number += other.number
+        self.sum += other.sum
+        self.least = min((each for each in (self.least, other.least) if each is not None), default=None)
+        self.greatest = max((each for each in (self.greatest, other.greatest) if each is not None), default=None)
+
     @classmethod
     def resumed(cls, number: int, least: Seconds | None, mean: Seconds | None, greatest: Seconds | None) -> "Spread":
         """Spread of `number` delays, of which these are known; none if there is no mean."""
@@ -77,6 +84,15 @@ class Count(Struct):
             return
         if event.delay_error is not None and event.delay_error > self.error:
             self.error = event.delay_error
+
+    def join(self, other: "Count") -> None:
+        """Add what another has counted."""
+        self.count += other.count
+        self.succeeded += other.succeeded
+        self.failed += other.failed
+        self.delays.join(other.delays)
+        self.failed_delays.join(other.failed_delays)
+        self.error = max(self.error, other.error)
 
     def statistics(self, kind: EventKind) -> KindStatistics:
         delays, failed_delays, decided = self.delays, self.failed_delays, self.succeeded + self.failed
@@ -118,6 +134,13 @@ class Starts:
             self._kept, self._settled = [last.seconds], count - 1
             if mean is not None and largest is not None:
                 self._first, self._largest_settled = last.seconds - mean * (count - 1), largest
+
+    def join(self, other: "Starts") -> None:
+        """Add the starts of another. Between those that are no longer kept the largest of both differences counts."""
+        self._kept = sorted((*self._kept, *other._kept))
+        self._settled += other._settled
+        self._first = min(self._first, other._first)
+        self._largest_settled = max(self._largest_settled, other._largest_settled)
 
     def _settle(self, horizon: Seconds) -> None:
         """Summarize the starts before `horizon`. The last of them is kept, for the next difference."""
@@ -186,6 +209,13 @@ class _Window:
             first = former.last_start.seconds - former.mtbce * (former.events - 1)
             own = 1 + round((last.seconds - first) / mean)
         self.own_starts.resume(own, mean, former.max_gap, last)
+
+    def join(self, other: "_Window") -> None:
+        """Add the counts and starts of another."""
+        for kind, count in other.counts.items():
+            self.counts[kind].join(count)
+        self.starts.join(other.starts)
+        self.own_starts.join(other.own_starts)
 
     def statistics(self, clock: str) -> WindowStatistics:
         starts, own = self.starts, self.own_starts
@@ -263,6 +293,13 @@ class EventTally:
     def resume(self, former: WindowStatistics) -> None:
         """Go on from the counts of a former life; the recent window begins anew."""
         self._session.resume(former)
+
+    def join(self, other: "EventTally") -> None:
+        """Add the events of another."""
+        self._session.join(other._session)
+        recent = sorted({**other._recent, **self._recent}.items(), key=lambda each: each[1].started.seconds)
+        self._recent = dict(recent)
+        self._open |= other._open
 
     def resume_event(self, event: ConnectionEvent) -> None:
         """Take an event that is not decided. The counts have its start, unless it came after they were last told."""
