@@ -1,4 +1,4 @@
-"""Ids of people: several that trackers give to one person, and the one by which events tell of this person. Pure.
+"""Ids of people: several that trackers of faces give to one person, and the one by which events tell of them. Pure.
 
     for join in identities.take(message, at): ...        # two ids have turned out to be one person
     message = identities.inward(message)                 # its ids are those by which recognition knows people
@@ -48,7 +48,7 @@ class Join(NamedTuple):
 
 
 class _Sighting(Struct):
-    """Place and time at which an id was seen last. since: first time. lost: when it was lost; None: it is there.
+    """Last sign of an id. since: time of the first one. lost: when the id was lost; None: it is there.
 
     reported: a loss would be told, by `ActorLost` or by a world without it. Else silence may be one.
     """
