@@ -20,6 +20,7 @@ from engage_hri.services.recognition.events.machine import TEXTS_KEPT
 from engage_hri.services.recognition.events.session import ACTIONS_KEPT, TURNS_KEPT
 from engage_hri.services.recognition.perceive.clock_errors import PEOPLE_KEPT
 from engage_hri.services.recognition.perceive.clock_restarts import REPORTERS_KEPT
+from engage_hri.services.recognition.perceive.identities import IDS_KEPT
 from engage_hri.services.recording.disk import FULL_CHUNK
 from engage_hri.services.recording.writing import MOST_CHANNELS
 from engage_hri.services.requests.serving import KEPT as NAMES_KEPT
@@ -34,10 +35,11 @@ LIMITS = {
     "events": EVENTS_KEPT, "said": UTTERANCES_SHOWN, "warned": WARNINGS_KEPT, "_encoded[*][*]": 2**20,
     "_channel_ids": MOST_CHANNELS, "channel_message_counts": MOST_CHANNELS,
     "_clocks": REPORTERS_KEPT, "_addressed": BLOCKS_KEPT, "_indices": FULL_CHUNK // 31, "records": FULL_CHUNK // 31,
-    "_heap": 4 * SLACK, "_scheduled": 400,
+    "_seen": IDS_KEPT, "joints": 20, "kinds": 4, "_heap": 4 * SLACK, "_scheduled": 400,
 }  # fmt: skip
 """Containers that are bounded by number, not by time: a message of a recording has 31 bytes at least.
-The last two drop what is outdated once there is much of it."""
+`joints` and `kinds` are of the message that a service has read last, whichever it was. The last two drop what is
+outdated once there is much of it."""
 STEPS = 6
 """Steps of life between two measures; of each, whatever leaks keeps at least one thing."""
 HALF_A_DAY, QUIET = 120, 165.0
