@@ -44,7 +44,7 @@ def is_listening(text: str) -> bool:
     return bool(said) and _LISTENER.fullmatch(said) is not None
 
 
-def has_words(text: str) -> bool:
+def says_words(text: str) -> bool:
     """True if somebody has said a word; a recognizer writes noises as signs or in brackets: "..." or "[laughter]"."""
     return bool(_plain(text))
 

@@ -16,7 +16,7 @@ from engage_hri.services.recognition.events.limits import in_time
 from engage_hri.services.recognition.events.listener_sign import WORDS_WAIT, ListenerSign, SignPart
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import SessionScene
-from engage_hri.services.text.listening import has_words, is_listening
+from engage_hri.services.text.listening import is_listening, says_words
 
 TURN_PATIENCE: Seconds = 12.0
 """Time after the robot's last word for which its unfinished turn still counts; longer than the silence after which
@@ -213,7 +213,7 @@ class Conversation:
             return  # a point in the robot's turn directs the gaze, and says nothing
         event = self._backchannel(self._scene.robot, self.id, sign.since, sign.confidence)
         for speech in sign.speeches:
-            is_noise = self.id in self._scene.worded and not has_words(self._writer.text_of(self.id, speech.since))
+            is_noise = self.id in self._scene.worded and not says_words(self._writer.text_of(self.id, speech.since))
             self._writer.interject(self.id, speech.since, "noise" if is_noise else "backchannel", until)
         if sign.speeches:
             event.spoken = tuple(speech.since for speech in sign.speeches)
@@ -266,7 +266,7 @@ class Conversation:
     def _listens(self, since: Seconds) -> bool | None:
         """True if the words of a speech are a listener's; None: they are unknown, or not said to the robot's turn."""
         words, event = self._writer.text_of(self.id, since), self.pair.event
-        if not has_words(words) or not self.robot_holds_floor or (event is not None and since < event.started):
+        if not says_words(words) or not self.robot_holds_floor or (event is not None and since < event.started):
             return None
         return is_listening(words)
 
