@@ -106,12 +106,8 @@ class Session:
         return sorted(speeches, key=lambda each: (each[1], each[0]))
 
     def contacts(self) -> dict[str, Probability | None]:
-        """Contact with each person for whom it may have changed since the last call."""
-        if not self._people.touched:
-            return {}
-        touched, self._people.touched = self._people.touched, set()
-        persons = self._people.persons
-        return {id: persons[id].contact for id in touched if id in persons}
+        """Contact with each person for whom it has changed since the last call."""
+        return self._people.contacts()
 
     @property
     def busy(self) -> Set[str]:
