@@ -177,8 +177,9 @@ class People:
             for id in [*scene.questions]:
                 self._update(self.persons[id])
             for id in sorted(self._unknown, key=lambda id: (self._unknown[id], id)):
-                self._apply(self.persons[id], at, lambda person: person.talk.go_on(at))
-                self._tell_taken_up(at)
+                if self.persons[id].talk.may_go_on(at):
+                    self._apply(self.persons[id], at, lambda person: person.talk.go_on(at))
+                    self._tell_taken_up(at)
         if self._silences != scene.silences:
             self._silences = scene.silences
             self._looks_may_direct(at)

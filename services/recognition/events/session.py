@@ -379,7 +379,7 @@ class Session:
                 self._robot_ends(ended, at)
 
     def _robot_gaze_changed(self, at: Seconds) -> None:
-        self._people.apply_to_all(at, lambda person: person.gaze_changed(at), lambda person: person.is_involved)
+        self._people.apply_to_all(at, lambda person: person.gaze_changed(at), lambda person: person.has_gaze_event)
 
     # -- requests -----------------------------------------------------------------------------------------------
 

@@ -259,16 +259,20 @@ class Talk:
             speech.faces.turns(speech.faces.face, at)
         self._address(speech, likely(speech, self._scene.spoken), at)
 
+    def may_go_on(self, now: Seconds) -> bool:
+        """True if it is decided by `now` to whom the first speech in line is, or if what is decided may be told."""
+        if not self._line:
+            return False
+        decided_at = self._decided_at
+        return not self._waits_for_others(self._line[0][0]) if decided_at is None else decided_at <= now
+
     def go_on(self, now: Seconds) -> None:
         """Tell all in line up to the next speech of which it is not known to whom it is."""
-        while self._line:
+        while self.may_go_on(now):
             at, item = self._line[0]
             if isinstance(item, OwnSpeech) and item.to is None:
-                if self._decided_at is None or self._decided_at > now:
-                    break
                 self._likely(item, now)
-            if self._waits_for_others(at):
-                break
+                continue
             self._line.popleft()
             self._catch_up(at)
             if not isinstance(item, OwnSpeech):
