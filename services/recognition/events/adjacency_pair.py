@@ -205,9 +205,10 @@ class AdjacencyPair(Machine):
     @property
     def question(self) -> Question | None:
         """The robot's question that waits for an answer, its turn being over; None: none does."""
-        if self.state != ROBOT_WAITING or self._turn_end is None or self.event is None or self.deadline is None:
+        if self.state != ROBOT_WAITING or self._turn_end is None or self.event is None:
             return None
-        return Question(self.event.accept, self._turn_end, self.deadline)
+        until = self.deadline
+        return None if until is None else Question(self.event.accept, self._turn_end, until)
 
     def other_answers(self, person: str, action: Action, at: Seconds) -> None:
         """Take the answer of somebody who was not asked: it is no failure of who was."""

@@ -80,14 +80,13 @@ class Conversation:
     @property
     def _pair_deadline(self) -> Seconds | None:
         """Deadline of the pair; None while speech of anybody that began in time may yet turn out to be the answer."""
-        at, speeches = self.pair.deadline, self._sign.speeches if self._sign is not None else []
-        if at is None:
+        pair, sign, at = self.pair, self._sign, self.pair.deadline
+        if at is None or not pair.may_be_answered:
+            return at
+        began_in_time = sign is not None and any(in_time(speech.since, at) for speech in sign.speeches)
+        if began_in_time and pair.may_be_answered_with("speak"):
             return None
-        began_in_time = any(in_time(speech.since, at) for speech in speeches)
-        if began_in_time and self.pair.may_be_answered_with("speak"):
-            return None
-        question = self.pair.question
-        return None if question is not None and self._scene.may_be_answered(self.id, question.until) else at
+        return None if pair.question is not None and self._scene.may_be_answered(self.id, at) else at
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         for pair in self._pairs():
