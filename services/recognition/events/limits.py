@@ -8,6 +8,7 @@ anchor may never come, if its behavior was dropped. So the wait ends with the bl
 
 import math
 from collections.abc import Iterable
+from functools import lru_cache
 
 from engage_hri.schemas.behavior_types import canonical_sync
 from engage_hri.schemas.references import BLOCK_ITSELF, SyncRef
@@ -25,6 +26,7 @@ def in_time(at: Seconds, limit: Seconds) -> bool:
     return at <= limit + ROUNDING
 
 
+@lru_cache(BLOCKS_KEPT)
 def anchor(reference: str) -> tuple[str, Seconds] | None:
     """Sync point that a reference means, and its offset: `g:strokeStart+0.5` -> `g:stroke_start`, 0.5.
 

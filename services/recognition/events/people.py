@@ -126,6 +126,8 @@ class People:
     def contacts(self) -> dict[str, Probability | None]:
         """Contact of each person for whom it has changed since the last call."""
         touched, told = self._touched, self._contacts
+        if not touched:
+            return {}
         changed = {id: now for id in touched if (now := self.persons[id].contact) != told.get(id)}
         touched.clear()
         told |= changed
@@ -172,7 +174,7 @@ class People:
         """
         scene = self._scene
         self._tell_taken_up(at)
-        while (self._unknown, self._asked) != (scene.unknown, scene.asked):
+        while self._unknown != scene.unknown or self._asked != scene.asked:
             self._unknown, self._asked = {**scene.unknown}, {*scene.asked}
             for id in [*scene.questions]:
                 self._update(self.persons[id])

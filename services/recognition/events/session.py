@@ -148,7 +148,7 @@ class Session:
     def feed(self, observation: Observation | Covered, at: Seconds) -> list[Effect]:
         """Take an observation of what happened at `at`. Slightly late or repeated ones are put right or ignored."""
         self._advance_before(at)
-        match observation:
+        match observation:  # what comes most often first
             case ActionBegan(actor=self.robot):
                 self._robot_begins(observation, at)
             case ActionEnded(actor=self.robot):
@@ -157,6 +157,14 @@ class Session:
                 self._people.observe(actor, at, lambda person: person.begins(observation, at))
             case ActionEnded(actor=actor) if actor in self.persons:
                 self._people.observe(actor, at, lambda person: person.ends(observation, at))
+            case World():
+                self._people.see(observation, at)
+            case SyncPointProgress(block=block):
+                name = self.blocks.realised(block, observation.behavior, observation.sync, at)
+                asked = {event.responder for event in self._live.values() if event.block == block}
+                for id in asked & self.persons.keys():
+                    if self.persons[id].waits_for(block, name):
+                        self._people.apply(id, at, lambda person: person.point_realised(block, name, at))
             case GoesOn(began=ActionBegan(actor=self.robot)):
                 self._robot_goes_on(observation.began, observation.since, at)
             case GoesOn(began=began, since=since):
@@ -175,12 +183,6 @@ class Session:
                 self._signal(observation, at)
             case Cancel():
                 self._cancel(observation, at)
-            case SyncPointProgress(block=block):
-                name = self.blocks.realised(block, observation.behavior, observation.sync, at)
-                asked = {event.responder for event in self._live.values() if event.block == block}
-                for id in asked & self.persons.keys():
-                    if self.persons[id].waits_for(block, name):
-                        self._people.apply(id, at, lambda person: person.point_realised(block, name, at))
             case BlockProgress(block=str() as block, progress="start"):
                 self._block_begins(block, at)
             case BlockProgress(block=str() as block, progress="end"):
@@ -192,8 +194,6 @@ class Session:
                 self._people.apply_to_all(
                     at, lambda person: person.head_owner_changed(at), lambda person: person.has_gaze_event
                 )
-            case World():
-                self._people.see(observation, at)
             case Covered():
                 self.scene.covered = observation
                 self._people.apply_to_all(at, lambda person: person.hands_changed())
