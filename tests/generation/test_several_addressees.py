@@ -162,6 +162,14 @@ def test_the_look_after_each_point_goes_around() -> None:
     assert glances == ["bob", "ann", "bob", "ann"]
 
 
+def test_each_is_asked_to_look_and_the_point_is_held_for_all() -> None:
+    made = block(TurnFragment(id="f", addressee=("ann", "bob"), behaviors=(reference("a"),)), [(POINT, "this one")])
+
+    asked = {each.id: each.responder for each in made.behaviors if isinstance(each, Event) if each.objects}
+    assert list(asked.values()) == ["ann", "bob"]
+    assert {f"a-point:stroke_end after {id}:end" for id in asked} <= {*lines(made, "a-timing")}
+
+
 def test_who_is_spoken_to_alone_is_not_looked_around() -> None:
     text = "One two three, four five six. Seven eight nine."
     made = block(TurnFragment(id="f", addressee="ann", behaviors=(Speech(id="s", text=text),)))
