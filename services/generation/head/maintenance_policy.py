@@ -235,7 +235,7 @@ class FaceWatch:
                 self._followed = to_answer[(place + 1) % len(to_answer)]
                 self._next_at = None
             self._goes_round = True
-            return Claim(kind="face", priority=6, target=self._followed, reason="is to answer, as others are")
+            return Claim(kind="face", priority=6, target=self._followed, reason="is to answer: others are, too")
         self._goes_round = False
         if not present:
             return Claim(kind="face", priority=6, reason="lost: hold the direction") if self._has_met else None
@@ -243,7 +243,7 @@ class FaceWatch:
             self._followed = self.partner
         elif self._followed not in present:  # stay with a face while it is seen, however people move about
             self._followed = present[0]
-        reason = "spoken to last" if self._followed == self.partner else "nearest when it came"
+        reason = "spoken with last" if self._followed == self.partner else "nearest when it came"
         return Claim(kind="face", priority=6, target=self._followed, reason=reason)
 
     def is_face(self, target: str) -> bool:
