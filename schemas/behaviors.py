@@ -352,6 +352,8 @@ _Spelled = (
     Gaze | GazeShift | Pointing | Gesture | Head | HeadDirectionShift | Face | FaceLexeme | FaceFacs | FaceShift
     | Posture | PostureShift | Pose | Locomotion | Speech | Wait | Emit | Event | TurnSignal
 )  # fmt: skip
+Looks = Gaze | GazeShift | HeadDirectionShift
+"""Behaviors that move the head to look at something."""
 BlockBehavior = _Spelled | Unknown
 """Behaviors that a BML block may hold."""
 FragmentBehavior = _Spelled | Reference

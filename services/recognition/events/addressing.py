@@ -30,7 +30,7 @@ SHORT_CALL = 3
 """Number of words up to which a name at the end calls somebody. Ours."""
 Addressees = frozenset[str]
 NOBODY: Addressees = frozenset()
-EVERYBODY: Addressees = frozenset(("",))
+WHOEVER: Addressees = frozenset(("",))
 """Of a speech of the robot of which nobody has said to whom it is."""
 
 
@@ -43,7 +43,7 @@ class Spoken(Struct, kw_only=True):
     until: Seconds | None = None
 
     def is_to(self, actor: str) -> bool:
-        return self.to is EVERYBODY or (self.to is not None and actor in self.to)
+        return self.to is WHOEVER or (self.to is not None and actor in self.to)
 
     def is_just_before(self, at: Seconds) -> bool:
         """True if a speech that begins at `at` comes during this one, or soon after it."""
