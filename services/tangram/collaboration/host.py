@@ -30,18 +30,20 @@ async def host(robot: Robot) -> None:
     """Ask the people who are there, one after the other and then all, and say goodbye."""
     await robot.person()
     names = {each.id: (each.name or each.id).title() for each in (await robot.world()).people}
-    answering = asyncio.create_task(_answer(robot, names))
+    speaking = asyncio.Lock()  # who is asked answers before anybody else is spoken to
+    answering = asyncio.create_task(_answer(robot, names, speaking))
     asked = cycle((names | {EVERYBODY: "Everybody"}).items())
     for number, (question, (who, name)) in enumerate(zip(QUESTIONS, asked, strict=False), start=1):
         await asyncio.sleep(BETWEEN)
         await _silence(robot)
-        await _say(robot, f"question-{number}", who, f"{name}, {question}", turn_index=1)
+        async with speaking:
+            await _say(robot, f"question-{number}", who, f"{name}, {question}", turn_index=1)
     await _silence(robot)
     answering.cancel()
     await _say(robot, "goodbye", EVERYBODY, "It was nice to listen to you. Goodbye.", turn_index=3)
 
 
-async def _answer(robot: Robot, names: dict[str, str]) -> None:
+async def _answer(robot: Robot, names: dict[str, str], speaking: asyncio.Lock) -> None:
     """Answer what people ask the robot."""
     answered = ""
     with robot.connection_events(kind="adjacency_pair") as pairs:
@@ -49,7 +51,8 @@ async def _answer(robot: Robot, names: dict[str, str]) -> None:
             is_question = pair.initiator in names and pair.state == "started" and pair.words.endswith("?")
             if is_question and pair.id != answered:
                 answered, name = pair.id, names[pair.initiator]
-                await _say(robot, f"answer-{pair.id}", pair.initiator, f"I do not know, {name}.", turn_index=2)
+                async with speaking:
+                    await _say(robot, f"answer-{pair.id}", pair.initiator, f"I do not know, {name}.", turn_index=2)
 
 
 async def _silence(robot: Robot) -> None:
