@@ -50,6 +50,14 @@ who looks at the robot while it waits has answered at once
     1 robot asks ann 2; 2 ann looks robot; 3.6 ann speaks 9; 4 known
     robot: started 1, succeeded 3.6 after 0.6
 
+... once: the next goes where her own words went
+    1 robot asks ann 1; 2.2 ann looks bob; 2.3 ann speaks 1; 3.4 ann looks nobody; 3.5 ann speaks 1; 20 end
+    robot: started 1, failed 6
+
+who has answered, and makes a sound without words, says no more
+    0.1 ann speaks 0.2 to=bob; 1 robot asks ann 2; 3.6 ann speaks 1 to=robot; 5.5 ann speaks 1; 20 end
+    robot: started 1, succeeded 3.6 after 0.6, completed 4.6
+
 somebody else answers
     1 robot asks ann 2; 2 bob looks robot; 3.6 bob speaks 1; 20 end
     robot: started 1, preempted 3.6 after 0.6 by bob
