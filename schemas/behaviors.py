@@ -275,9 +275,9 @@ class Event(Behavior, frozen=True, kw_only=True, tag="event", omit_defaults=True
     objects: ids of what it is about.
     cause: what the robot begins it for. optional: its failure does not count.
     limit: time within which the person has to respond; None: recognition's default.
-    anchors: sync references of the same block (`phrase-1:start`). The limit runs from the latest of these and the
-    start of the event, so not before all of them are realised or their block has ended. An adjacency pair has none:
-    its limit runs from the `ended` signal of its turn.
+    anchors: sync references of the same block (`phrase-1:start`). A gaze event starts when all of them are realised
+    or their block has ended, or before that when the robot looks or points there. Its limit runs from the latest of
+    its start and these. An adjacency pair has none: its limit runs from the `ended` signal of its turn.
     turn: of an adjacency pair, the turn that opens it.
     """
 
