@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import json
 import re
 import secrets
 import socket
@@ -21,6 +22,7 @@ from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from engage_hri.schemas.behaviors import EVENT_KINDS
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
@@ -129,7 +131,9 @@ def _app(
     enter: Callable[[Request], Response | None] = lambda request: None,
 ) -> Starlette:
     """The page and its frames. close: is called at the end. enter: may answer in place of the page."""
-    page = (PAGE / "index.html").read_text(encoding="utf-8").replace("{robot}", escape(robot))
+    kinds = [(kind, each.short, each.is_answered) for kind, each in EVENT_KINDS.items()]
+    page = (PAGE / "index.html").read_text(encoding="utf-8").replace("{kinds}", escape(json.dumps(kinds)))
+    page = page.replace("{robot}", escape(robot))
 
     imports = re.search("<script type=.importmap.>(.*?)</script>", page)
     assert imports is not None

@@ -288,7 +288,7 @@ class Session:
         if to is None:
             self._tell("", at, step)
         else:
-            for actor in to:
+            for actor in sorted(to):
                 self._tell(actor, at, step)
 
     def addressees_of(self, behavior: str) -> Addressees | None:
