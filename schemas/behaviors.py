@@ -19,14 +19,14 @@ EventKind = Literal["directed_gaze", "mutual_facial_gaze", "adjacency_pair", "ba
 class KindOfEvent(Struct, frozen=True, kw_only=True):
     """A kind of connection event, for all who list, count or show them.
 
-    title: as people write it. short: the same where there is little room. prefix: of the ids.
+    title: as people write it. short: the same where there is little room, if it differs. prefix: of the ids.
     delay: mean seconds until it is decided, by Table 2.1. Whoever plans with it knows no better.
     is_answered: the other has to respond; else the sign of the other is the event, and can be neither late nor fail.
     needs_objects: the robot cannot begin it without an object.
     """
 
     title: str
-    short: str
+    short: str = ""
     prefix: str
     delay: Seconds
     is_answered: bool = True
@@ -34,12 +34,10 @@ class KindOfEvent(Struct, frozen=True, kw_only=True):
 
 
 EVENT_KINDS: Mapping[EventKind, KindOfEvent] = {
-    "directed_gaze": KindOfEvent(
-        title="directed gaze", short="directed gaze", prefix="dg", delay=0.3, needs_objects=True
-    ),
+    "directed_gaze": KindOfEvent(title="directed gaze", prefix="dg", delay=0.3, needs_objects=True),
     "mutual_facial_gaze": KindOfEvent(title="mutual facial gaze", short="mutual gaze", prefix="mfg", delay=0.7),
-    "adjacency_pair": KindOfEvent(title="adjacency pair", short="adjacency pair", prefix="ap", delay=0.4),
-    "backchannel": KindOfEvent(title="backchannel", short="backchannel", prefix="bc", delay=0.0, is_answered=False),
+    "adjacency_pair": KindOfEvent(title="adjacency pair", prefix="ap", delay=0.4),
+    "backchannel": KindOfEvent(title="backchannel", prefix="bc", delay=0.0, is_answered=False),
 }
 """Kinds of connection events, in the order of all tables. `services/recognition/events` has a module for each."""
 ACTIONS: Mapping[Action, tuple[str, str]] = {
