@@ -397,7 +397,7 @@ class Conversation:
             self._floor_is_free(at)
 
     def withdraw(self, event: OngoingEvent, at: Seconds, *, is_orphan: bool) -> None:
-        """Withdraw a pair of the robot; see `PersonRecognition.withdraw`."""
+        """Withdraw a pair of the robot; see `Talk.withdraw`."""
         if self.pair.event is event and (self.pair.robot_holds_turn or not is_orphan):
             self.pair.abort(at)
 

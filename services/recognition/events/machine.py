@@ -1,4 +1,4 @@
-"""The base of the four recognizers: a transition table as data, the ongoing event, and the writer of its changes.
+"""The base of all recognizers: a transition table as data, the ongoing event, and the writer of its changes.
 
 A row says to which state an input leads, and which changes of the connection event are published on the way.
 Guards are part of the input's name (`robot_directs_shared`), so that table and diagram are complete.
@@ -10,7 +10,7 @@ from typing import ClassVar, NamedTuple
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import Action, Cause, EventKind
+from engage_hri.schemas.behaviors import EVENT_KINDS, Action, Cause, EventKind
 from engage_hri.schemas.recognition import (
     ENDINGS,
     ConnectionEvent,
@@ -49,9 +49,6 @@ IDLE = "idle"
 DECISIONS: frozenset[EventState] = frozenset({"succeeded", "failed", "preempted", "withdrawn", "superseded"})
 DECIDED: frozenset[EventState] = DECISIONS | {"lost"}
 """States that answer a request."""
-PREFIX: Mapping[EventKind, str] = {
-    "directed_gaze": "dg", "mutual_facial_gaze": "mfg", "adjacency_pair": "ap", "backchannel": "bc",
-}  # fmt: skip
 
 
 class UndefinedTransition(Exception):
@@ -133,7 +130,7 @@ class EventWriter:
         self.effects: list[Effect] = []
         self._clock = clock
         self._session = session
-        self._count: dict[EventKind, int] = dict.fromkeys(PREFIX, 0)
+        self._count: dict[EventKind, int] = dict.fromkeys(EVENT_KINDS, 0)
         self._open: dict[str, OngoingEvent] = {}
         """Published events that have not ended, by id."""
         self._words_patience = words_patience
@@ -159,7 +156,7 @@ class EventWriter:
         """
         if not event.id:
             self._count[event.kind] += 1
-            event.id = f"{self._session}{PREFIX[event.kind]}-{self._count[event.kind]}"
+            event.id = f"{self._session}{EVENT_KINDS[event.kind].prefix}-{self._count[event.kind]}"
         at = event.changed = max(at, event.started if event.changed is None else event.changed)
         if state == "failed" and not retold:
             event.delay = at - event.started

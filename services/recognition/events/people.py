@@ -186,7 +186,7 @@ class People:
     def _looks_may_direct(self, at: Seconds) -> None:
         """Update the deadlines of those whose looks may direct the robot's now, for what all share has changed."""
         for person in list(self._here.values()):
-            if person.look_directs_at is not None:
+            if person.gazes.look_directs_at is not None:
                 self._apply(person, at, lambda person: None)
 
     def _apply(self, person: PersonRecognition, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:

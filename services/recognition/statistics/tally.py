@@ -11,17 +11,16 @@ that is told of the recent window: of each event in it only the last change is k
 from bisect import bisect_left, insort
 from collections.abc import Iterable, Sequence
 from operator import sub
-from typing import NamedTuple, get_args
+from typing import NamedTuple
 
 from msgspec import Struct, field
 
-from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.behaviors import EVENT_KINDS, EventKind
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, KindStatistics, WindowStatistics
 from engage_hri.schemas.units import Seconds, Stamp
 
 SETTLED: Seconds = 120.0
 """Longest time until a start becomes known: a later one is counted, but splits no gap."""
-KINDS: tuple[EventKind, ...] = get_args(EventKind)
 
 
 class Spread(Struct):
@@ -178,7 +177,7 @@ class _Window:
     """Counts and starts of the session, or of the recent window."""
 
     def __init__(self) -> None:
-        self.counts = {kind: Count() for kind in KINDS}
+        self.counts = {kind: Count() for kind in EVENT_KINDS}
         self.starts = Starts()
         self.own_starts = Starts()
         """Starts without the glances that the maintenance policy caused."""
