@@ -178,7 +178,7 @@ class People:
             self._unknown, self._asked = {**scene.unknown}, {*scene.asked}
             for id in [*scene.questions]:
                 self._update(self.persons[id])
-            for id in sorted(self._unknown, key=lambda id: (self._unknown[id], id)):
+            for id in sorted(self._unknown, key=lambda id: scene.place(id, self._unknown[id])):
                 if self.persons[id].talk.may_go_on(at):
                     self._apply(self.persons[id], at, lambda person: person.talk.go_on(at))
                     self._tell_taken_up(at)
@@ -201,7 +201,7 @@ class People:
     def _looks_may_direct(self, at: Seconds) -> None:
         """Update the deadlines of those whose looks may direct the robot's now, for what all share has changed."""
         for person in list(self._here.values()):
-            if person.look_directs_at is not None:
+            if person.gazes.look_directs_at is not None:
                 self._apply(person, at, lambda person: None)
 
     def _apply(self, person: PersonRecognition, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
