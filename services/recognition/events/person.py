@@ -194,7 +194,7 @@ class PersonRecognition:
         self.gaze_changed(self.gaze.expire())
 
     def gaze_changed(self, at: Seconds) -> None:
-        """Take a change of the person's or the robot's gaze."""
+        """Take a change of the person's gaze."""
         self.talk.looks_at(self.gazes.face, at)
         self.gazes.gaze_changed(at)
 

@@ -370,7 +370,9 @@ class Session:
                 self._robot_ends(ended, at)
 
     def _robot_gaze_changed(self, at: Seconds) -> None:
-        self._people.apply_to_all(at, lambda person: person.gaze_changed(at), lambda person: person.has_gaze_event)
+        self._people.apply_to_all(
+            at, lambda person: person.gazes.gaze_changed(at), lambda person: person.gazes.is_under_way
+        )
 
     # -- requests -----------------------------------------------------------------------------------------------
 
