@@ -252,8 +252,10 @@ class SessionScene:
 
     def is_contested(self, person: str, at: Seconds) -> bool:
         """True if the robot asks somebody, and another began to speak before this, it is not known yet to whom."""
+        if not self.asked or not self.unknown:
+            return False
         place = self.place(person, at)
-        return bool(self.asked) and any(self.place(who, since) < place for who, since in self.unknown.items())
+        return any(self.place(who, since) < place for who, since in self.unknown.items())
 
     def place(self, person: str, at: Seconds) -> tuple[Seconds, bool, str]:
         """Place of what a person begins to say in the order in which people are heard: who is asked comes first."""
