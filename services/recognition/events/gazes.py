@@ -60,8 +60,7 @@ class Gazes(KindRecognizer):
 
     @property
     def is_in_contact(self) -> bool:
-        is_shared = self.facial.is_shared or any(one.is_shared for one in self.directed)
-        return is_shared or self._scene.robot in self.gaze.targets
+        return self.on_robots_face or self.facial.is_shared or any(one.is_shared for one in self.directed)
 
     @property
     def look_directs_at(self) -> Seconds | None:
