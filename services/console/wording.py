@@ -17,14 +17,6 @@ from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.vocabulary import normal
 
-KINDS: dict[of.EventKind, str] = {
-    "directed_gaze": "directed gaze",
-    "mutual_facial_gaze": "mutual facial gaze",
-    "adjacency_pair": "adjacency pair",
-    "backchannel": "backchannel",
-}
-"""Event kinds as people write them, in the order of the tables."""
-
 SEEN: Seconds = 0.005
 """Error of a delay from which on it changes the two digits that are shown."""
 
@@ -48,22 +40,12 @@ def clock(value: Seconds) -> str:
     return f"{int(minutes)}:{rest:04.1f}"
 
 
-VERBS: dict[of.Action, tuple[str, str]] = {
-    "look": ("looks", "at "),
-    "point": ("points", "at "),
-    "nod": ("nods", "to "),
-    "shake": ("shakes the head", "to "),
-    "speak": ("speaks", "to "),
-    "act": ("moves", ""),
-}
-
-
 def action_words(action: of.Action, targets: Sequence[str], robot: str) -> tuple[str, str]:
     """Words for an action and its targets: `looks`, `at the robot`.
 
     A look without targets is a look away; other actions without targets have no words for them.
     """
-    verb, preposition = VERBS[action]
+    verb, preposition = of.ACTIONS[action]
     if not targets:
         return verb, "away" if action == "look" else ""
     return verb, preposition + " and ".join("the robot" if target == robot else target for target in targets)

@@ -11,6 +11,7 @@ from statistics import fmean
 
 from msgspec import Struct
 
+from engage_hri.schemas.behaviors import EVENT_KINDS
 from engage_hri.schemas.body import Ray
 from engage_hri.schemas.fragments import Claim
 from engage_hri.schemas.recognition import ConnectionEvent
@@ -88,7 +89,7 @@ class ResponsePolicy:
             if answer.event.kind == "mutual_facial_gaze" and answer.event.initiator in others:
                 continue
             index = sum(now >= turn for turn in self._turns(answer))
-            kind = answer.event.kind.replace("_", " ")
+            kind = EVENT_KINDS[answer.event.kind].title
             return Claim(
                 kind="response",
                 priority=4,

@@ -28,9 +28,9 @@ TOLD_EVERY: Seconds = 1.0
 class _ActorStatistics:
     """Counts and estimate of one person, or of all."""
 
-    def __init__(self, config: RecognitionConfig, clock: str) -> None:
+    def __init__(self, config: RecognitionConfig, clock: str, robot: str) -> None:
         self.tally = EventTally(config.window, clock)
-        self.engagement = Engagement(config, self.tally)
+        self.engagement = Engagement(config, self.tally, robot)
         self.told_at: Seconds = -inf
         self.is_new = False
         """True if something has changed since it was told."""
@@ -61,7 +61,7 @@ class PublishedStatistics:
         self._robot = robot
         self._clock = clock
         self._config = config
-        self._actors = defaultdict[str, _ActorStatistics](partial(_ActorStatistics, config, clock))
+        self._actors = defaultdict[str, _ActorStatistics](partial(_ActorStatistics, config, clock, robot))
         self._changed: set[str] = set()
         """Actors of whom something has come in since `told` was last called."""
         self._agenda: Deadlines[str] = Deadlines(str)
@@ -104,7 +104,7 @@ class PublishedStatistics:
     def resume(self, former: Statistics, now: Seconds) -> None:
         """Go on from the numbers of a former life. Its contacts and recent events are not known."""
         name = former.actor
-        one = self._actors[name] = _ActorStatistics(self._config, self._clock)
+        one = self._actors[name] = _ActorStatistics(self._config, self._clock, self._robot)
         one.tally.resume(former.session)
         one.engagement.estimate = EngagementEstimate(former.engagement, former.level, former.reasons)
         one.is_new = True
