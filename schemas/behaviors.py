@@ -311,9 +311,9 @@ class Event(Behavior, frozen=True, kw_only=True, tag="event", omit_defaults=True
     objects: ids of what it is about.
     cause: what the robot begins it for. optional: its failure does not count.
     limit: time within which the person has to respond; None: recognition's default.
-    anchors: sync references of the same block (`phrase-1:start`). The limit runs from the latest of these and the
-    start of the event, so not before all of them are realised or their block has ended. An adjacency pair has none:
-    its limit runs from the `ended` signal of its turn.
+    anchors: sync references of the same block (`phrase-1:start`). A gaze event starts when all of them are realised
+    or their block has ended, or before that when the robot looks or points there. Its limit runs from the latest of
+    its start and these. An adjacency pair has none: its limit runs from the `ended` signal of its turn.
     turn: of an adjacency pair, the turn that opens it.
     """
 
@@ -388,6 +388,8 @@ _Spelled = (
     Gaze | GazeShift | Pointing | Gesture | Head | HeadDirectionShift | Face | FaceLexeme | FaceFacs | FaceShift
     | Posture | PostureShift | Pose | Locomotion | Speech | Wait | Emit | Event | TurnSignal
 )  # fmt: skip
+Looks = Gaze | GazeShift | HeadDirectionShift
+"""Behaviors that move the head to look at something."""
 BlockBehavior = _Spelled | Unknown
 """Behaviors that a BML block may hold."""
 FragmentBehavior = _Spelled | Reference

@@ -36,7 +36,7 @@ def number(value: Seconds | None, sign: bool = False) -> str:
 
 def clock(value: Seconds) -> str:
     """Write seconds since the view began as `1:23.4`."""
-    minutes, rest = divmod(max(0.0, value), 60)
+    minutes, rest = divmod(round(max(0.0, value), 1), 60)
     return f"{int(minutes)}:{rest:04.1f}"
 
 

@@ -15,6 +15,7 @@ from engage_hri.schemas.recognition import ConnectionEvent, KindStatistics, Wind
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.statistics.engagement import ENOUGH_EVENTS
+from tests.recognition.observations import ROBOT
 
 Life = list[ConnectionEvent]
 
@@ -85,7 +86,8 @@ def engagement(lives: list[Life], now: Seconds, busy_until: Seconds, config: Rec
         change.state
         for life in of_window(lives, now, config.window)
         for change in life
-        if change.state in ("succeeded", "failed") and not change.optional
+        if not change.optional
+        and (change.state == "succeeded" or (change.state == "failed" and change.initiator == ROBOT))
     ]
     quality = judged.count("succeeded") / len(judged) if judged else 1.0
     return min(1.0, usual / longest if longest else 1.0) * quality

@@ -44,6 +44,11 @@ class ListeningPolicy:
         self._speaking, self._asked, self._speaker, self._until = {}, {}, "", None
 
     @property
+    def asked(self) -> tuple[str, ...]:
+        """Ids of the people whose answers the robot waits for, in the order in which it named them."""
+        return tuple(dict.fromkeys(self._asked.values()))
+
+    @property
     def deadline(self) -> Seconds | None:
         """Time of the next change of the claim without a message."""
         due = [since + ONSET for since in self._speaking.values()]
@@ -56,7 +61,7 @@ class ListeningPolicy:
         if self._robot in self._speaking:
             self._speaker, self._until = "", None
             return None
-        draws = [who for who in self._asked.values() or present if who in present]
+        draws = [who for who in self.asked or present if who in present]
         heard = [who for who, since in self._speaking.items() if who in draws and now >= since + ONSET]
         if heard:
             self._speaker, self._until = heard[0], None

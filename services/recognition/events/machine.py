@@ -75,6 +75,13 @@ def table(*rows: TransitionRow) -> Table:
     return by_input
 
 
+class Speech(NamedTuple):
+    """A speech of a person, by its start."""
+
+    actor: str
+    since: Seconds
+
+
 class OngoingEvent(Struct, kw_only=True):
     """A connection event between its start and its end, with all that its `ConnectionEvent` messages say."""
 
@@ -104,8 +111,8 @@ class OngoingEvent(Struct, kw_only=True):
     changed: Seconds | None = None
     is_former: bool = False
     """True if a former life of recognition has told its start already. Its delay is not known."""
-    spoken: tuple[Seconds, ...] = ()
-    """Starts of the person's speeches that it consists of: its words are theirs."""
+    spoken: tuple[Speech, ...] = ()
+    """People's speeches that it consists of: its words are theirs."""
 
     def rests_on(self, confidence: Probability) -> None:
         """Count one more observation, of this confidence."""
@@ -127,8 +134,8 @@ class EventWriter:
         self._open: dict[str, OngoingEvent] = {}
         """Published events that have not ended, by id."""
         self._words_patience = words_patience
-        self._texts: Latest[tuple[str, Seconds], str] = Latest(TEXTS_KEPT)
-        """Words of speeches, by person and start."""
+        self._texts: Latest[Speech, str] = Latest(TEXTS_KEPT)
+        """Words of speeches."""
         self._spoken: Latest[str, tuple[OngoingEvent, ConnectionEvent]] = Latest(TEXTS_KEPT)
         """Events with speech of a person, each as it was last told."""
         self.answered: list[tuple[OngoingEvent, Seconds]] = []
@@ -195,9 +202,9 @@ class EventWriter:
 
     def understand(self, person: str, speech: Seconds, text: str, at: Seconds) -> None:
         """Take the words of a speech, known at `at`. Events that consist of it are told again if they have others."""
-        self._texts[person, speech] = text
+        self._texts[Speech(person, speech)] = text
         for event, told in tuple(self._spoken.values()):
-            if speech not in event.spoken or person not in (event.initiator, event.responder):
+            if (person, speech) not in event.spoken:
                 continue
             words = self._words_of(event)
             is_too_late = event.id not in self._open and at > (event.changed or at) + self._words_patience
@@ -210,7 +217,7 @@ class EventWriter:
 
     def text_of(self, person: str, speech: Seconds) -> str:
         """Words of a speech, as far as they are known; "": none."""
-        return self._texts.get((person, speech), "")
+        return self._texts.get(Speech(person, speech), "")
 
     def _forget_spoken(self, at: Seconds) -> None:
         """Forget the events that are not told again, whatever may become known of their words."""
@@ -221,11 +228,7 @@ class EventWriter:
             del self._spoken[id]
 
     def _words_of(self, event: OngoingEvent) -> str:
-        if not event.spoken:
-            return ""
-        pair = (event.initiator, event.responder)
-        texts = (self._texts.get((actor, speech), "") for speech in event.spoken for actor in pair)
-        return " ".join(filter(None, texts))
+        return " ".join(filter(None, (self._texts.get(speech) for speech in event.spoken)))
 
     def has_open(self, person: str) -> bool:
         """True if an event with `person` is open."""

@@ -164,7 +164,7 @@ class People:
             self._unknown, self._asked = {**scene.unknown}, {*scene.asked}
             for id in [*scene.questions]:
                 self._update(self.persons[id])
-            for id in sorted(self._unknown, key=lambda id: (self._unknown[id], id)):
+            for id in sorted(self._unknown, key=lambda id: scene.place(id, self._unknown[id])):
                 self._apply(self.persons[id], at, lambda person: person.talk.go_on(at))
                 self._tell_taken_up(at)
         if self._silences != scene.silences:

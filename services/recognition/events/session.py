@@ -22,7 +22,7 @@ from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.addressing import EVERYBODY, NOBODY, Addressees, Spoken
+from engage_hri.services.recognition.events.addressing import NOBODY, WHOEVER, Addressees, Spoken
 from engage_hri.services.recognition.events.conversation import TURN_PATIENCE
 from engage_hri.services.recognition.events.history import ActionHistory, Latest
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock, anchor
@@ -99,7 +99,7 @@ class Session:
     def floor(self) -> list[tuple[str, Seconds, Addressees]]:
         """All speeches that go on, the first first: who speaks, since when, and to whom (empty: not known yet)."""
         said = self.scene.robot_spoken
-        speeches = [] if said is None else [(self.robot, said.since, (said.to or NOBODY) - EVERYBODY)]
+        speeches = [] if said is None else [(self.robot, said.since, (said.to or NOBODY) - WHOEVER)]
         for person in self.persons.values():
             if person.presence.here and person.talk.speaks_since is not None:
                 speeches.append((person.id, person.talk.speaks_since, person.talk.speaks_to))
@@ -277,9 +277,7 @@ class Session:
 
     def _robot_speaks(self, began: ActionBegan, at: Seconds) -> None:
         self.scene.speaks(self.robot)
-        self.scene.robot_spoken = Spoken(
-            actor=self.robot, since=at, to=self.addressees_of(began.behavior) or EVERYBODY
-        )
+        self.scene.robot_spoken = Spoken(actor=self.robot, since=at, to=self.addressees_of(began.behavior) or WHOEVER)
         self.scene.note_spoken(self.scene.robot_spoken)
 
     def _say(self, began: ActionBegan, at: Seconds, step: Step) -> None:

@@ -26,6 +26,7 @@ from engage_hri.services.recognition.events.kinds import KindRecognizer, TimedSt
 from engage_hri.services.recognition.events.limits import ROUNDING, LimitClock
 from engage_hri.services.recognition.events.machine import EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import Question, SessionScene
+from engage_hri.services.text.listening import says_words
 
 LONGEST_UNKNOWN: Seconds = 3.0
 """Time after which it is decided to whom a speech is that still goes on, by the looks so far. Ours."""
@@ -308,7 +309,8 @@ class Talk(KindRecognizer):
         """Decide to whom a speech is by what is likely."""
         if speech.until is None:
             speech.faces.turns(speech.faces.face, at)
-        self._address(speech, likely(speech, self._scene.spoken), at)
+        is_noise = self._scene.tells_addressees and not says_words(speech.words)
+        self._address(speech, likely(speech, self._scene.spoken, is_noise=is_noise), at)
 
     def go_on(self, now: Seconds) -> None:
         """Tell all in line up to the next speech of which it is not known to whom it is."""

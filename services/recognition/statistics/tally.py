@@ -314,7 +314,7 @@ class EventTally:
 
     def next_change(self, now: Seconds) -> Seconds | None:
         """Time after `now` at which the next event leaves the recent window."""
-        first = self.pace(now).first
+        first = min((event.started.seconds for event in self._window(now)), default=None)
         return None if first is None else first + self._length
 
     def session(self) -> WindowStatistics:
@@ -327,8 +327,11 @@ class EventTally:
             window.counts[event.kind].decide(event)
         return window.statistics(self._clock)
 
-    def pace(self, now: Seconds) -> RecentPace:
-        """Pace and failures of the recent window. Preempted, withdrawn and superseded events are not judged."""
+    def pace(self, now: Seconds, robot: str) -> RecentPace:
+        """Pace and failures of the recent window. Preempted, withdrawn and superseded events are not judged.
+
+        Nor are those that the robot has not answered: they say nothing of the person. robot: its actor id.
+        """
         events = self._window(now)
         starts = [event.started.seconds for event in events]
         if not starts:
@@ -336,6 +339,8 @@ class EventTally:
         judged = [
             event.state
             for event in events
-            if not event.optional and event.state in ("succeeded", "failed") and not event.is_answered_by_another
+            if not event.optional
+            and (event.state == "succeeded" or (event.state == "failed" and event.initiator == robot))
+            and not event.is_answered_by_another
         ]
         return RecentPace(min(starts), max(starts), len(starts), judged.count("failed"), len(judged))
