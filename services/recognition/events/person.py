@@ -67,9 +67,9 @@ class PersonRecognition:
     @property
     def deadline(self) -> Seconds | None:
         """Time of the next step that is due by itself, unless an input comes before; then call `pass_time`."""
-        times = [self.presence.deadline]
-        if self.gaze.targets:
-            times += self.gaze.deadline, self.gazes.look_directs_at
+        gaze, times = self.gazes.gaze, [self.presence.deadline]
+        if gaze.targets:
+            times += gaze.deadline, self.gazes.look_directs_at
         for each in self._recognizers:
             times += each.deadlines
         for doing in self._doing.values():
@@ -95,8 +95,10 @@ class PersonRecognition:
     @property
     def contact(self) -> Probability | None:
         """Contact with the robot now, from 0 to 1; None: nobody has told where the person looks."""
-        if self.presence.here and any(each.is_in_contact for each in self._recognizers):
-            return 1.0
+        if self.presence.here:
+            for each in self._recognizers:
+                if each.is_in_contact:
+                    return 1.0
         return None if self.gaze.since == 0.0 and not self.gaze.targets else 0.0
 
     def pass_time(self, at: Seconds) -> None:
