@@ -110,6 +110,26 @@ def test_while_it_waits_for_an_answer_the_talk_of_others_does_not_draw_it() -> N
     assert looks(stage) == [(14.0, "ben")]
 
 
+def test_who_speaks_to_the_robot_has_its_eyes_and_not_who_talks_on_or_looks_at_it() -> None:
+    stage = company()
+    stage.feed(Floor(at=AT, speeches=(FloorSpeech(actor="ben", since=AT, to=("cem",)),)))
+    stage.until(12.0)
+    answers = FloorSpeech(actor="ann", since=AT, to=("robot",))
+    stage.feed(Floor(at=AT, speeches=(FloorSpeech(actor="ben", since=AT, to=("cem",)), answers)))
+    stage.until(13.0)
+    facial = {"kind": "mutual_facial_gaze", "initiator": "cem", "objects": ()}
+    stage.feed(event("look", "started", **facial))
+    stage.until(15.0)
+    assert looks(stage) == [(10.6, "ben"), (12.3, "ann")]
+
+    stage.feed(event("point", "started", initiator="cem", objects=("cup",)))
+    assert looks(stage)[2:] == [(15.0, "cup")], "what somebody points at may be what is spoken of"
+    stage.feed(event("point", "failed", initiator="cem", objects=("cup",)))
+    stage.feed(Floor(at=AT, speeches=()))
+    stage.until(15.5)
+    assert looks(stage)[3:] == [(15.0, "ann"), (15.0, "cem")]
+
+
 def asked_all(stage: Stage, state: str, **fields: object) -> None:
     for who in ("ann", "ben", "cem"):
         told = event(who, state, kind="adjacency_pair", initiator="robot", responder=who, objects=(), **fields)

@@ -250,10 +250,12 @@ class Arbiter:
     def _claims(self, now: Seconds) -> list[Claim]:
         face = self._faces.claim(now, self._listening.asked if self._waits else ())
         self._glances.face = face.target if face else ""
-        listens = self._listening.claim(now, self._faces.present(now))
+        present = self._faces.present(now)
+        listens = self._listening.claim(now, present)
+        answers = self._responses.claim(now, {*present} - {*self._listening.drawing(present)})
         claims = [
             self._inhibition.claim if self._inhibition else None, self._fragment or self._thought,
-            self._glances.claim(now), self._responses.claim(now) or listens, self._hands.claim(now), face,
+            self._glances.claim(now), answers or listens, self._hands.claim(now), face,
         ]  # fmt: skip
         return [claim for claim in claims if claim is not None]
 

@@ -12,7 +12,7 @@ from engage_hri.services.recognition.events.machine import (
     EventWriter,
     Machine,
     OngoingEvent,
-    Speech,
+    SpeechStart,
     TransitionRow,
     table,
 )
@@ -52,9 +52,9 @@ TABLE = table(
 )
 
 
-def _spoken(person: str, action: Action, at: Seconds) -> tuple[Speech, ...]:
+def _spoken(person: str, action: Action, at: Seconds) -> tuple[SpeechStart, ...]:
     """Speech of which a turn consists that a person has begun with an action; none if it is wordless."""
-    return (Speech(person, at),) if action == "speak" else ()
+    return (SpeechStart(person, at),) if action == "speak" else ()
 
 
 class AdjacencyPair(Machine):

@@ -60,7 +60,9 @@ class Gazes(KindRecognizer):
 
     @property
     def is_in_contact(self) -> bool:
-        return self.on_robots_face or self.facial.is_shared or any(one.is_shared for one in self.directed)
+        if self._scene.robot in self.gaze.targets or self.facial.is_shared:
+            return True
+        return bool(self.directed) and any(one.is_shared for one in self.directed)
 
     @property
     def look_directs_at(self) -> Seconds | None:

@@ -75,7 +75,7 @@ def table(*rows: TransitionRow) -> Table:
     return by_input
 
 
-class Speech(NamedTuple):
+class SpeechStart(NamedTuple):
     """A speech of a person, by its start."""
 
     actor: str
@@ -111,7 +111,7 @@ class OngoingEvent(Struct, kw_only=True):
     changed: Seconds | None = None
     is_former: bool = False
     """True if a former life of recognition has told its start already. Its delay is not known."""
-    spoken: tuple[Speech, ...] = ()
+    spoken: tuple[SpeechStart, ...] = ()
     """People's speeches that it consists of: its words are theirs."""
 
     def rests_on(self, confidence: Probability) -> None:
@@ -134,7 +134,7 @@ class EventWriter:
         self._open: dict[str, OngoingEvent] = {}
         """Published events that have not ended, by id."""
         self._words_patience = words_patience
-        self._texts: Latest[Speech, str] = Latest(TEXTS_KEPT)
+        self._texts: Latest[SpeechStart, str] = Latest(TEXTS_KEPT)
         """Words of speeches."""
         self._spoken: Latest[str, tuple[OngoingEvent, ConnectionEvent]] = Latest(TEXTS_KEPT)
         """Events with speech of a person, each as it was last told."""
@@ -202,7 +202,7 @@ class EventWriter:
 
     def understand(self, person: str, speech: Seconds, text: str, at: Seconds) -> None:
         """Take the words of a speech, known at `at`. Events that consist of it are told again if they have others."""
-        self._texts[Speech(person, speech)] = text
+        self._texts[SpeechStart(person, speech)] = text
         for event, told in tuple(self._spoken.values()):
             if (person, speech) not in event.spoken:
                 continue
@@ -217,7 +217,7 @@ class EventWriter:
 
     def text_of(self, person: str, speech: Seconds) -> str:
         """Words of a speech, as far as they are known; "": none."""
-        return self._texts.get(Speech(person, speech), "")
+        return self._texts.get(SpeechStart(person, speech), "")
 
     def _forget_spoken(self, at: Seconds) -> None:
         """Forget the events that are not told again, whatever may become known of their words."""

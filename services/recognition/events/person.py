@@ -67,7 +67,7 @@ class PersonRecognition:
     @property
     def deadline(self) -> Seconds | None:
         """Time of the next step that is due by itself, unless an input comes before; then call `pass_time`."""
-        times, gaze = [self.presence.deadline], self.gaze
+        gaze, times = self.gazes.gaze, [self.presence.deadline]
         if gaze.targets:
             times += gaze.deadline, self.gazes.look_directs_at
         for each in self._recognizers:
