@@ -104,8 +104,7 @@ class Deadlines(Generic[K]):
 
     def clear(self, name: K) -> None:
         """Remove the deadline of `name`, if it has one."""
-        if self._at.pop(name, None) is not None:
-            self._drop_outdated()
+        self._at.pop(name, None)
 
     def set(self, name: K, at: Seconds | None) -> None:
         """Give `name` this deadline instead of any other; None removes it."""
@@ -118,13 +117,6 @@ class Deadlines(Generic[K]):
             if len(self._heap) > OUTDATED + 4 * len(self._at):
                 self._heap = [entry for entry in self._heap if self._at.get(entry[-1]) == entry[0]]
                 heapq.heapify(self._heap)
-            self._drop_outdated()
-
-    def _drop_outdated(self) -> None:
-        """Let no outdated entry be on top."""
-        heap = self._heap
-        while heap and self._at.get(heap[0][-1]) != heap[0][0]:
-            heapq.heappop(heap)
 
     def __getitem__(self, name: K) -> Seconds | None:
         return self._at.get(name)
@@ -135,7 +127,10 @@ class Deadlines(Generic[K]):
     @property
     def earliest(self) -> Seconds | None:
         """The earliest deadline; None if there is none."""
-        return self._heap[0][0] if self._heap else None
+        heap = self._heap
+        while heap and self._at.get(heap[0][-1]) != heap[0][0]:
+            heapq.heappop(heap)
+        return heap[0][0] if heap else None
 
     @property
     def first(self) -> K | None:
@@ -148,8 +143,8 @@ class Deadlines(Generic[K]):
         if earliest is None or earliest > now:
             self.look = inf if earliest is None else earliest
             return None
-        name = self._heap[0][-1]
-        Deadlines.clear(self, name)
+        name = heapq.heappop(self._heap)[-1]
+        del self._at[name]
         return name
 
 
