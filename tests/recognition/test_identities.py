@@ -15,7 +15,8 @@ from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.intake import Intake, Output
-from engage_hri.services.recognition.perceive.identities import IDS_KEPT, Identities, renamed
+from engage_hri.services.recognition.perceive.identities import IDS_KEPT, Identities, Join
+from engage_hri.services.reports.same_people import renamed
 from engage_hri.services.runtime.intake import (
     AnswerRequest,
     Input,
@@ -327,6 +328,7 @@ def test_memory_stays_flat_however_often_an_id_changes() -> None:
     for number in range(4 * IDS_KEPT):
         found = ActorFound(actor=f"face_{number}", at=stamp(number), same_as="ann")
         for join in identities.take(found, float(number)):
+            assert isinstance(join, Join)
             identities.join(join.former, join.newer, join.name)
         sizes.append(sum(kinds(identities).values()))
 

@@ -1,12 +1,13 @@
 """Speech of people into the robot's turns, and what came of it: recognition says what it is. Pure."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 from msgspec import Struct
 
 from engage_hri.schemas.fragments import Interjected
 from engage_hri.schemas.recognition import Interjection
 from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.services.reports.same_people import renamed
 
 UNDECIDED: Seconds = 3.0
 """Time after which the robot goes on although nobody has said what a speech is: recognition may have died. Ours."""
@@ -104,6 +105,12 @@ class Interjections:
         """People whose speech in this turn is undecided, and since when."""
         waiting = [each for each in self._kept.values() if each.waits and each.turn == turn]
         return {each.told.actor: each.counts_from for each in reversed(waiting) if each.counts_from is not None}
+
+    def rename(self, name: Callable[[str], str]) -> None:
+        """Tell of people by other ids from now on. name: the new one of each."""
+        for each in self._kept.values():
+            each.told = renamed(each.told, name)
+        self._kept = {(name(actor), since): each for (actor, since), each in self._kept.items()}
 
     def give_up(self, actor: str, now: Seconds) -> None:
         """Wait for the readings of this person's speeches no longer: nobody has told them in time."""

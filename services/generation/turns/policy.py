@@ -8,7 +8,7 @@ Fragments of one turn arrive one by one while earlier ones are still performed. 
 was accepted; whatever ends it early (barge-in, fault, cancellation, silence) also ends the fragments in line.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from typing import Literal
 
 from msgspec import Struct
@@ -23,6 +23,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.generation.turns.interjections import UNDECIDED, Interjections
 from engage_hri.services.reports.action_reports import FACE_GRACE
+from engage_hri.services.reports.same_people import renamed
 
 TURN_SILENCE: Seconds = 10.0
 """Silence after which an open turn closes as aborted. Recognition waits for its end for longer. Ours."""
@@ -219,6 +220,13 @@ class TurnPolicy:
     def fragment_begins(self, turn: str) -> None:
         """Note that the block of a fragment of `turn` is on its way."""
         self._begun.setdefault(turn, False)
+
+    def rename(self, name: Callable[[str], str]) -> None:
+        """Speak to people by other ids from now on. name: the new one of each."""
+        self._live = {id: renamed(plan, name) for id, plan in self._live.items()}
+        self._open = self._open and renamed(self._open, name)
+        self._away = {name(id): since for id, since in self._away.items()}
+        self.interjections.rename(name)
 
     def turn_ended(self, turn: str, now: Seconds) -> None:
         """Note that a turn is over: its end was signalled. Its last block may go on for a moment."""
