@@ -93,7 +93,7 @@ class PerceivedPerson:
         other: that id, as a tracker of faces had it, or the name of whom it has recognized.
 
         Raises:
-            InputRefused: `other` can be no person's id, or the person has not come or has left.
+            InputRefused: `other` can be no person's id.
         """
         self._check()
         if not keys.is_chunk(taken(other, str, f"{self.id}: same_as")) or other in (self.id, self.robot):
