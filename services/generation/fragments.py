@@ -168,7 +168,7 @@ class Fragments:
             case Interjection():
                 self._turns.interject(message, now)
             case ActionEnded(action="speak"):
-                self._turns.interjections.falls_silent(message.actor)
+                self._turns.interjections.falls_silent(message.actor, now)
             case SyncPointProgress():
                 self._follow(message, now)
             case WordSpoken(block=block):

@@ -310,6 +310,7 @@ class TurnPolicy:
         waiting = self.interjections.waits_in(turn)
         limits = {("undecided", actor): opened + UNDECIDED for actor, opened in waiting.items()}
         limits |= {("counts", actor): at for actor, at in self.interjections.unheeded_in(turn).items()}
+        limits |= {("lasts", actor): at for actor, at in self.interjections.wordless_in(turn).items()}
         if self._barge_in is not None:
             voiced = self.interjections.voiced_in(turn)
             limits |= {("talks", actor): opened + self._barge_in for actor, opened in voiced.items()}
@@ -351,7 +352,9 @@ class TurnPolicy:
             silence = f"silence for {TURN_SILENCE:g} s"
             since, speaker = self._silent_since, self._speaker
             return self._abort(self._open, self._sight.fault(silence, "", "late", speaker, "", since))
-        if (actor := self._taken_by or (who if why == "talks" else "")) and (current := self._current) is not None:
+        if (actor := self._taken_by or (who if why in ("talks", "lasts") else "")) and (
+            current := self._current
+        ) is not None:
             return self._abort(current, Fault(reason=f"{actor} took the floor", cause="cancelled", whose=actor))
         return None
 
