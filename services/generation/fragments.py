@@ -168,7 +168,7 @@ class Fragments:
             case Interjection():
                 self._turns.interject(message, now)
             case ActionEnded(action="speak"):
-                self._turns.interjections.falls_silent(message.actor, now)
+                self._turns.interjections.falls_silent(message.actor)
             case SyncPointProgress():
                 self._follow(message, now)
             case WordSpoken(block=block):
@@ -177,6 +177,7 @@ class Fragments:
                         performance.hear(message)
             case Utterance() if message.actor != self._robot:
                 self._heard.feed(message, now)
+                self._turns.hear(message, now)
 
     def rename(self, name: Callable[[str], str]) -> None:
         """Speak to people by other ids from now on. name: the new one of each."""

@@ -64,9 +64,7 @@ def expected(said: Said, named: object, after: float) -> tuple[float | None, flo
         heeded, floor = max(known, counts), said.since + WORDLESS
         if heeded >= floor:
             return heeded, 0.0, 0.0
-        if said.lasts > WORDLESS:
-            return floor, counts, floor
-        return None, counts, max(said.since + said.lasts, min(known, counts + UNDECIDED))
+        return (floor if said.lasts > WORDLESS else None), counts, floor
     if known is not None and known <= counts:
         return (counts if said.reading == "interruption" else None), 0.0, 0.0
     gives_up = counts + UNDECIDED
@@ -94,7 +92,7 @@ def test_a_speech_breaks_the_turn_off_only_if_it_may_and_lasts(seed: int) -> Non
     ticks = [round(1.0 + number / 100, 2) for number in range(700)]
     for at, what in sorted([(round(at, 2), what) for at, what in steps] + [(at, 3) for at in ticks]):
         if what == 0:
-            turns.interjections.falls_silent(said.who, at)
+            turns.interjections.falls_silent(said.who)
         elif what < 3:
             turns.interject(news(said.who, "open" if what == 1 else reading, said.since, said.words), at)
         elif ended is None:

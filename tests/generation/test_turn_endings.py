@@ -192,6 +192,6 @@ def test_a_voice_takes_the_floor_by_its_length_only_if_that_is_set(*, ends: bool
     turns = speaking(barge_in=0.5)
     turns.interject(into("open"), 2.0)
     if ends:
-        turns.interjections.falls_silent("human", 2.2)
+        turns.interjections.falls_silent("human")
 
     assert (turns.tick(2.5) is None) == ends

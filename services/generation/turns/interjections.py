@@ -46,8 +46,8 @@ class _Kept(Struct):
 
     @property
     def is_wordless(self) -> bool:
-        """True while it would interrupt if its voice lasted."""
-        return self.waits and self.is_voiced and self.told.reading == "interruption"
+        """True while it would interrupt if its voice lasted, or had words."""
+        return self.waits and self.told.reading == "interruption"
 
 
 class Interjections:
@@ -75,9 +75,8 @@ class Interjections:
         kept.told = told
         takes_floor = told.reading == "interruption" and kept.turn == turn and kept.is_heeded
         if takes_floor and not kept.lasts(now):
-            if kept.is_wordless:
-                return False  # it may be a laugh
-            takes_floor = False
+            kept.waits = True  # it may be a laugh, or its words may come
+            return False
         self._release(kept, now, went_on=not takes_floor)
         if told.reading != "interruption":
             kept.counts_from = None
@@ -109,16 +108,14 @@ class Interjections:
             kept.waits, kept.held = False, now - kept.counts_from
         kept.went_on = went_on
 
-    def falls_silent(self, actor: str, now: Seconds) -> None:
+    def falls_silent(self, actor: str) -> None:
         """Note that a person speaks no more."""
         for each in self._kept.values():
             if each.told.actor == actor:
-                if each.is_wordless and not each.lasts(now):
-                    self._release(each, now, went_on=True)
                 each.is_voiced = False
 
     def wordless_in(self, turn: str) -> Mapping[str, Seconds]:
-        """People whose voice without words interrupts this turn if it lasts, and from when on."""
+        """People whose voice without words interrupts this turn if it lasts, or has words, until when."""
         return {
             each.told.actor: each.began + WORDLESS
             for each in self._kept.values()
@@ -149,6 +146,16 @@ class Interjections:
         for each in self._kept.values():
             if each.waits and each.told.actor == actor:
                 self._release(each, now, went_on=True)
+
+    def decide_wordless(self, actor: str, now: Seconds, *, has_words: bool) -> bool:
+        """Decide what this person says without words. has_words: by now it has. True: it takes the floor."""
+        takes_floor = False
+        for each in self._kept.values():
+            if each.is_wordless and each.told.actor == actor:
+                is_floor = has_words or each.is_voiced
+                self._release(each, now, went_on=not is_floor)
+                takes_floor |= is_floor
+        return takes_floor
 
     def turn_over(self, turn: str, now: Seconds, *, went_on: bool) -> None:
         """Wait for nothing of a turn that is over. went_on: it was performed to its end."""

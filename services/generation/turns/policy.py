@@ -17,6 +17,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import EVERYBODY, TurnFragment, TurnStatus, ids_in
+from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import Interjection
 from engage_hri.schemas.requests import are_of_one_run
 from engage_hri.schemas.units import Seconds
@@ -24,6 +25,7 @@ from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.generation.turns.interjections import UNDECIDED, Interjections
 from engage_hri.services.reports.action_reports import FACE_GRACE
 from engage_hri.services.reports.same_people import renamed
+from engage_hri.services.text.listening import is_listening, says_words
 
 TURN_SILENCE: Seconds = 10.0
 """Silence after which an open turn closes as aborted. Recognition waits for its end for longer. Ours."""
@@ -281,6 +283,12 @@ class TurnPolicy:
         elif self.interjections.feed(told, current.turn, now, after=current.gives_way_after(told.actor)):
             self._taken_by = told.actor
 
+    def hear(self, utterance: Utterance, now: Seconds) -> None:
+        """Note words, by which a voice without any may turn out to interrupt."""
+        says_more = says_words(utterance.text) and not is_listening(utterance.text)
+        if utterance.final and says_more and self.interjections.decide_wordless(utterance.actor, now, has_words=True):
+            self._taken_by = utterance.actor
+
     @property
     def held(self) -> str:
         """The turn that waits because it is undecided whether somebody interrupts it; "": none does."""
@@ -337,9 +345,12 @@ class TurnPolicy:
         for name, at in limits.items():
             self._waits.keep(name, at, now)
         why, who = self._waits.due(now) or ("", "")
-        while why in ("undecided", "counts"):
+        while why in ("undecided", "counts", "lasts"):
             if why == "undecided":
                 self.interjections.give_up(who, now)
+            elif why == "lasts":
+                if self.interjections.decide_wordless(who, now, has_words=False):
+                    self._taken_by = who
             elif self.interjections.heed(who, now):
                 self._taken_by = who
             why, who = self._waits.due(now) or ("", "")
@@ -352,9 +363,7 @@ class TurnPolicy:
             silence = f"silence for {TURN_SILENCE:g} s"
             since, speaker = self._silent_since, self._speaker
             return self._abort(self._open, self._sight.fault(silence, "", "late", speaker, "", since))
-        if (actor := self._taken_by or (who if why in ("talks", "lasts") else "")) and (
-            current := self._current
-        ) is not None:
+        if (actor := self._taken_by or (who if why == "talks" else "")) and (current := self._current) is not None:
             return self._abort(current, Fault(reason=f"{actor} took the floor", cause="cancelled", whose=actor))
         return None
 
