@@ -28,7 +28,7 @@ class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event",
 
     id: made by recognition. kind: which of the four. state: the one that it has now.
     initiator: actor id of the one that began it. responder: actor id of the one that is to answer.
-    started: when it began. objects: ids of the objects that it is about.
+    started: when it began: of a gaze, when the initiator's look had arrived. objects: ids of what it is about.
     cause: what it was begun for; `human`: a person began it. optional: its failure does not count.
     delay: seconds from the initiator's start to the responder's start; of an adjacency pair from the end of the turn,
     and negative for an early answer; of a failed event from its start to its failure; None while undecided and for
@@ -168,7 +168,7 @@ class RequestEvent(Request, frozen=True, kw_only=True, tag="request_event", omit
 
     Refused if it is invalid (unknown actor, no objects).
 
-    at: when the event began: the realizer released it then.
+    at: when the robot set out: the realizer released it then. A gaze event starts when it has arrived.
     """
 
     block: str

@@ -208,6 +208,8 @@ class Fragments:
         performance.feed(progress)
         if performance.signalled_end:
             self._turns.turn_ended(performance.turn.turn, now)
+            if not self._turns.holds_the_turn:
+                self._arbiter.wait_for_answers()
         self._follow_gaze(performance)
 
     def _follow_gaze(self, performance: FragmentPerformance) -> None:

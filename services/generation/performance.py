@@ -11,8 +11,7 @@ from engage_hri.schemas.behaviors import (
     BlockBehavior,
     Event,
     Gaze,
-    GazeShift,
-    HeadDirectionShift,
+    Looks,
     Pointing,
     Speech,
     TurnSignal,
@@ -47,8 +46,6 @@ MOST_TRIES = 5
 """Number of blocks after which the gestures of a reference that is to be chosen again are not tried any more."""
 AWAITED = ("directed_gaze", "mutual_facial_gaze")
 """Events that must be decided before the outcome. An adjacency pair is not: a person's answer may take long."""
-Looks = Gaze | GazeShift | HeadDirectionShift
-"""Behaviors that move the head to look at something."""
 
 
 class Ended(Struct, frozen=True):

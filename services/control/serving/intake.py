@@ -37,10 +37,8 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import (
     Action,
     BlockBehavior,
-    Gaze,
-    GazeShift,
     Head,
-    HeadDirectionShift,
+    Looks,
     Pointing,
     Speech,
 )
@@ -351,7 +349,7 @@ class ControlIntake:
     def _look(self, moved: steps.EyesMoved) -> None:
         """Publish what the eyes rest on now. A behavior of the head has brought them there, if it tells just then."""
         live = self._live.get(moved.request)
-        of_head = live is not None and isinstance(live.request.behavior, Gaze | GazeShift | HeadDirectionShift)
+        of_head = live is not None and isinstance(live.request.behavior, Looks)
         self._act(self._actions.looks_at(moved.on, live.label if live is not None and of_head else "", moved.at))
 
     def _act(self, actions: list[ActionMessage]) -> None:

@@ -14,7 +14,7 @@ from engage_hri.services.recognition.events.backchannel import BRIEF, UNDECIDED,
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.limits import in_time
 from engage_hri.services.recognition.events.listener_sign import WORDS_WAIT, ListenerSign, SignPart
-from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent
+from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent, SpeechStart
 from engage_hri.services.recognition.events.scene import SessionScene
 from engage_hri.services.text.listening import is_listening, says_words
 
@@ -216,7 +216,7 @@ class Conversation:
             is_noise = self._scene.is_worded and not says_words(self._writer.text_of(self.id, speech.since))
             self._writer.interject(self.id, speech.since, "noise" if is_noise else "backchannel", until)
         if sign.speeches:
-            event.spoken = tuple(speech.since for speech in sign.speeches)
+            event.spoken = tuple(SpeechStart(self.id, speech.since) for speech in sign.speeches)
             self._brief = sign.speeches[-1].since, sign.speeches[-1].until
         self.own_backchannel.speaks(event)
         self.own_backchannel.ends(until)
@@ -305,7 +305,7 @@ class Conversation:
             event = OngoingEvent(
                 kind="adjacency_pair", initiator=self.id, responder=self._scene.robot, started=at,
                 limit=self._config.adjacency_pair_limit, confidence=confidence,
-                spoken=(at,) if action == "speak" else (),
+                spoken=(SpeechStart(self.id, at),) if action == "speak" else (),
             )  # fmt: skip
             pair.human_asks(event, action)
         if action == "speak" and self.speaks_since is None and self.silent_since is not None:
@@ -397,7 +397,7 @@ class Conversation:
             self._floor_is_free(at)
 
     def withdraw(self, event: OngoingEvent, at: Seconds, *, is_orphan: bool) -> None:
-        """Withdraw a pair of the robot; see `PersonRecognition.withdraw`."""
+        """Withdraw a pair of the robot; see `Talk.withdraw`."""
         if self.pair.event is event and (self.pair.robot_holds_turn or not is_orphan):
             self.pair.abort(at)
 

@@ -164,7 +164,7 @@ class People:
             self._unknown, self._asked = {**scene.unknown}, {*scene.asked}
             for id in [*scene.questions]:
                 self._update(self.persons[id])
-            for id in sorted(self._unknown, key=lambda id: (self._unknown[id], id)):
+            for id in sorted(self._unknown, key=lambda id: scene.place(id, self._unknown[id])):
                 self._apply(self.persons[id], at, lambda person: person.talk.go_on(at))
                 self._tell_taken_up(at)
         if self._silences != scene.silences:
@@ -186,7 +186,7 @@ class People:
     def _looks_may_direct(self, at: Seconds) -> None:
         """Update the deadlines of those whose looks may direct the robot's now, for what all share has changed."""
         for person in list(self._here.values()):
-            if person.look_directs_at is not None:
+            if person.gazes.look_directs_at is not None:
                 self._apply(person, at, lambda person: None)
 
     def _apply(self, person: PersonRecognition, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:

@@ -251,8 +251,12 @@ class SessionScene:
 
     def is_contested(self, person: str, at: Seconds) -> bool:
         """True if the robot asks somebody, and another began to speak before this, it is not known yet to whom."""
-        unknown = ((since, who) for who, since in self.unknown.items() if who != person)
-        return bool(self.asked) and any(each < (at, person) for each in unknown)
+        place = self.place(person, at)
+        return bool(self.asked) and any(self.place(who, since) < place for who, since in self.unknown.items())
+
+    def place(self, person: str, at: Seconds) -> tuple[Seconds, bool, str]:
+        """Place of what a person begins to say in the order in which people are heard: who is asked comes first."""
+        return at, person not in self.asked, person
 
     def may_be_answered(self, person: str, until: Seconds) -> bool:
         """True if somebody else has begun to speak by then, of whom it is not known yet to whom it is."""
