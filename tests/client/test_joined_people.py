@@ -114,7 +114,7 @@ def test_one_person_is_there_once_for_all(is_stale: bool) -> None:
         assert await eyes.people() == [("ann", NEXT)]
         assert eyes.picture.present == ("ann",)
         assert "face_3" not in str(eyes.picture.section("scene"))
-        assert (eyes.owners[-1].owner.target, eyes.owners[-1].owner.reason) == ("ann", "spoken to last")
+        assert (eyes.owners[-1].owner.target, eyes.owners[-1].owner.reason) == ("ann", "spoken with last")
         before = len(eyes.owners)
 
         told = await answering(eyes, eyes.say("Do you like tea?"))
