@@ -140,6 +140,29 @@ class Floor(Struct, frozen=True, kw_only=True, tag="floor", omit_defaults=True):
     speeches: tuple[FloorSpeech, ...] = ()
 
 
+class SamePerson(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Another id of a person. actor: this id. name: the one by which the person is told of.
+
+    is_guess: it was first seen where the person had just been lost. Else perception has said so.
+    """
+
+    actor: str
+    name: str
+    is_guess: bool = False
+
+
+class SamePeople(Struct, frozen=True, kw_only=True, tag="same_people", omit_defaults=True):
+    """state: recognition. The people of whom perception tells by several ids.
+
+    What perception tells of the other ids is of the person with this name, and so is what the robot does to them.
+
+    at: the instant of the last change. people: all other ids, those that have been known for longest first.
+    """
+
+    at: Stamp
+    people: tuple[SamePerson, ...] = ()
+
+
 class RequestEvent(Request, frozen=True, kw_only=True, tag="request_event", omit_defaults=True):
     """cmd: realizer -> recognition: begin a connection event (thesis Fig. 5.2). Terminal state: `EventOutcome`.
 

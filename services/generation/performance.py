@@ -1,6 +1,6 @@
 """One fragment from its acceptance to its outcome: what is under way, and which events it still waits for."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Literal
 
 from msgspec import Struct
@@ -39,6 +39,7 @@ from engage_hri.services.generation.references.policy import Unreferable
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.outcomes import TurnEvents
 from engage_hri.services.generation.turns.policy import TurnPlan
+from engage_hri.services.reports.same_people import renamed
 from engage_hri.services.text.ear import is_spoken
 
 MOST_TRIES = 5
@@ -176,6 +177,11 @@ class FragmentPerformance:
         """The behavior that holds the head now, if there is one. A shift holds it until the block ends."""
         behavior = self._behaviors.get(self._gaze) if self._ended is None else None
         return behavior if isinstance(behavior, Looks) else None
+
+    def rename(self, name: Callable[[str], str]) -> None:
+        """Speak to people by other ids from now on. name: the new one of each."""
+        self.fragment, self.turn = renamed(self.fragment, name), renamed(self.turn, name)
+        self.left, self.turn_left = renamed(self.left, name), renamed(self.turn_left, name)
 
     def goes_on_with(self, other: "FragmentPerformance") -> bool:
         """True if this is another fragment of the same turn, and its block is on its way or being performed."""

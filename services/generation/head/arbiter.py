@@ -23,6 +23,7 @@ from engage_hri.services.generation.head.listening_policy import ListeningPolicy
 from engage_hri.services.generation.head.maintenance_policy import FaceWatch, GlanceWatch, HandWatch, OfPeople
 from engage_hri.services.generation.head.response_policy import ResponsePolicy
 from engage_hri.services.generation.inhibitions import Inhibition
+from engage_hri.services.reports.same_people import renamed
 
 DWELL: Seconds = 0.3
 """Time that the head stays after its owner let go, before a lower claim gets it: a claim that comes back at once
@@ -194,6 +195,18 @@ class Arbiter:
     def wait_for_answers(self) -> None:
         """Note that the robot's turn is over: from now on those whom it has asked may answer."""
         self._waits = True
+
+    def join(self, other: str, name: str) -> None:
+        """Take two ids for one person, who is called `name` from now on. The next world has nobody called `other`."""
+
+        def joined(id: str) -> str:
+            return name if id == other else id
+
+        self._faces.join(other, name)
+        self._glances.forget(other)
+        self._owner = renamed(self._owner, joined)
+        self._base, self._held = renamed(self._base, joined), renamed(self._held, joined)
+        self._fragment, self._thought = (each and renamed(each, joined) for each in (self._fragment, self._thought))
 
     def shift_failed(self, id: str, now: Seconds) -> None:
         """Note that shift `id` did not arrive: the same place is tried again after a pause, any other at once."""

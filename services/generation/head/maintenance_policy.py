@@ -195,6 +195,14 @@ class FaceWatch:
         self._lost.comes(id)
         self._here.add(id)
 
+    def join(self, other: str, name: str) -> None:
+        """Take two ids for one person: `other` has not been lost, but is `name`."""
+        self.partner, self._followed = (name if id == other else id for id in (self.partner, self._followed))
+        if other in self._people:
+            self._people[name] = self._people.pop(other)
+            self._find(name)
+        self.forget(other)
+
     def forget(self, id: str) -> None:
         """Drop somebody who has been gone for long."""
         self._here.discard(id)

@@ -1,6 +1,6 @@
 """Outcomes of the robot's turns, once all of each is decided: connection events, and what people said. Pure."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
 from typing import Literal
 
 from msgspec import Struct
@@ -225,6 +225,11 @@ class TurnOutcomes:
         if not turn.backchannel:
             self._records.setdefault(turn.turn, _Record(turn.addressee, turn.others)).spoken[fragment] = ()
         return displaced
+
+    def rename(self, name: Callable[[str], str]) -> None:
+        """Tell of people by other ids from now on. name: the new one of each."""
+        for record in self._records.values():
+            record.addressee, record.others = name(record.addressee), tuple(map(name, record.others))
 
     def refuse(self, fragment: str, turn: TurnPlan) -> None:
         """Take a fragment out of its turn again: the realizer has refused it."""

@@ -181,7 +181,7 @@ class Conversation:
     @property
     def _is_worded(self) -> bool:
         """True if words of what the person says now may come, and would decide what it is."""
-        return self.robot_holds_floor and self.id in self._scene.worded
+        return self.robot_holds_floor and self._scene.is_worded
 
     def _sign_is_due(self, at: Seconds) -> None:
         """Decide the sign: its speech has become too long for a backchannel, or its words have not come."""
@@ -212,7 +212,7 @@ class Conversation:
             return  # a point in the robot's turn directs the gaze, and says nothing
         event = self._backchannel(self._scene.robot, self.id, sign.since, sign.confidence)
         for speech in sign.speeches:
-            is_noise = self.id in self._scene.worded and not says_words(self._writer.text_of(self.id, speech.since))
+            is_noise = self._scene.is_worded and not says_words(self._writer.text_of(self.id, speech.since))
             self._writer.interject(self.id, speech.since, "noise" if is_noise else "backchannel", until)
         if sign.speeches:
             event.spoken = tuple(SpeechStart(self.id, speech.since) for speech in sign.speeches)

@@ -139,8 +139,8 @@ class SessionScene:
         """Those of whom perception reports that it sees them."""
         self.names: dict[str, str] = {robot.casefold(): robot}
         """Actor ids by what people call them."""
-        self.worded: set[str] = set()
-        """People whose words somebody tells."""
+        self.is_worded = False
+        """True once somebody has told spoken words, of whomever: a recognizer hears all voices."""
         self.tells_addressees = False
         """True if perception has ever told to whom somebody speaks."""
         self.told_addressees: Latest[tuple[str, Seconds], Addressees] = Latest(SPOKEN_KEPT)
@@ -204,7 +204,6 @@ class SessionScene:
     def forget_person(self, person: str) -> None:
         self.present.discard(person)
         self.found.discard(person)
-        self.worded.discard(person)
         self.names = {name: id for name, id in self.names.items() if id != person}
 
     def join(self, other: str, kept: str) -> None:

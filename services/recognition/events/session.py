@@ -341,7 +341,7 @@ class Session:
         if words.to is not None:
             self.scene.tells_addressees = True
             self.scene.told_addressees[words.actor, words.since] = words.to
-        self.scene.worded.add(words.actor)
+        self.scene.is_worded |= not words.is_line
         if words.text:
             self._writer.understand(words.actor, words.since, words.text, at)
         if words.actor in self.persons:
