@@ -205,7 +205,7 @@ class Fragments:
             return
         # A fragment that has ended is second choice, but it still hears of its events.
         performance = min(named, key=lambda each: each.is_over)
-        performance.feed(progress)
+        performance.feed(progress, self._events.session)
         if performance.signalled_end:
             self._turns.turn_ended(performance.turn.turn, now)
             if not self._turns.holds_the_turn:

@@ -131,6 +131,8 @@ class TurnEvents:
         """The turn of each block."""
         self._changed: dict[str, Seconds] = {}
         """When each event came to its state."""
+        self.session = ""
+        """Session of recognition's present life; empty: none is there, as far as is known."""
 
     def expect(self, block: str, turn: str) -> None:
         self._turn_of[block] = turn
@@ -151,6 +153,7 @@ class TurnEvents:
 
     def lose(self, session: str = "") -> None:
         """End undecided events of other sessions as lost: recognition is gone, or has come back as `session`."""
+        self.session = session
         for id, event in self._events.items():
             if event.state == "started" and event.session != session:
                 self._events[id] = replace(event, state="lost")
