@@ -31,7 +31,7 @@ from tests.random_cases import share_of
 LIMITS = {
     "_carriers": KEYS_KEPT, "_wanting": KEYS_KEPT, "_used": NAMES_KEPT, "_told": UTTERANCES_KEPT, "_told_of": PEOPLE,
     "_said": WORDS_KEPT, "_errors": PEOPLE_KEPT + 1, "_ended_turns": TURNS_KEPT, "_aborted_turns": TURNS_KEPT,
-    "_performed": ACTIONS_KEPT, "_texts": TEXTS_KEPT, "_spoken": TEXTS_KEPT, "_points": BLOCKS_KEPT,
+    "_performed": ACTIONS_KEPT, "_texts": TEXTS_KEPT, "_spoken": TEXTS_KEPT, "_interjected": TEXTS_KEPT, "_points": BLOCKS_KEPT,
     "events": EVENTS_KEPT, "said": UTTERANCES_SHOWN, "warned": WARNINGS_KEPT, "_encoded[*][*]": 2**20,
     "_channel_ids": MOST_CHANNELS, "channel_message_counts": MOST_CHANNELS,
     "_clocks": REPORTERS_KEPT, "_addressed": BLOCKS_KEPT, "_indices": FULL_CHUNK // 31, "records": FULL_CHUNK // 31,

@@ -348,6 +348,7 @@ class Session:
             self._people.apply(
                 words.actor, at, lambda person: person.talk.understand(words.since, words.text, words.to, at)
             )
+        self._writer.interject_again(words.actor, words.since, at)
 
     def _robot_is_heard(self, is_speaking: bool, at: Seconds) -> None:
         """End speech with a lost end: the body showed that it speaks, and for `SILENCE` no longer does."""

@@ -31,7 +31,8 @@ from engage_hri.services.text.listening import says_words
 LONGEST_UNKNOWN: Seconds = 3.0
 """Time after which it is decided to whom a speech is that still goes on, by the looks so far. Ours."""
 ADDRESSEES_WAIT: Seconds = 1.0
-"""Time after a speech for which perception is waited for that tells to whom people speak. Ours."""
+"""Time after a speech for which its words are waited for, where perception tells words: they may call somebody by
+name, and perception may say to whom they are. Ours."""
 LONGEST_UNTOLD: Seconds = 60.0
 """As `LONGEST_UNKNOWN`, where perception tells addressees: it may do so only with the words, when the speech is over.
 No speech is longer (`LONGEST_SPEECH`). Ours."""
@@ -109,7 +110,7 @@ class Talk(KindRecognizer):
         longest = speech.since + (LONGEST_UNTOLD if self._scene.tells_addressees else LONGEST_UNKNOWN)
         if speech.until is None:
             return longest
-        return min(longest, speech.until + (ADDRESSEES_WAIT if self._scene.tells_addressees else 0.0))
+        return min(longest, speech.until + (ADDRESSEES_WAIT if self._scene.is_worded else 0.0))
 
     # -- the person ---------------------------------------------------------------------------------------------
 
