@@ -26,7 +26,7 @@ class Said(NamedTuple):
 
 
 def told(*speeches: Said, worded: bool, end: float = TURN[1]) -> list[tuple[float, str, float]]:
-    """Each new reading: start of the speech, reading, and when it was told. worded: words of the person came before."""
+    """Each new reading: start of the speech, reading, and when it was told. worded: words came before."""
     log, changes = Log(adjacency_pair_limit=4.0), []
     if worded:
         log.begins(HUMAN, "speak", 0.1)

@@ -44,6 +44,8 @@ class Mishap(NamedTuple):
 
 TEXTS_KEPT = 64
 """Number of speeches whose words, and of events with speech, that are remembered."""
+INTERJECTIONS_KEPT = 16
+"""Number of interjections that are remembered, to be told again when their words become known."""
 Effect = ConnectionEvent | Interjection | EventOutcome | TurnOutcome | Accepted | Refused | PersonForgotten | Mishap
 IDLE = "idle"
 DECISIONS: frozenset[EventState] = frozenset({"succeeded", "failed", "preempted", "withdrawn", "superseded"})
@@ -136,7 +138,7 @@ class EventWriter:
         self._words_patience = words_patience
         self._texts: Latest[SpeechStart, str] = Latest(TEXTS_KEPT)
         """Words of speeches."""
-        self._interjected: Latest[SpeechStart, Interjection] = Latest(TEXTS_KEPT)
+        self._interjected: Latest[SpeechStart, Interjection] = Latest(INTERJECTIONS_KEPT)
         """What people have said into the robot's turns, as it was last told."""
         self._spoken: Latest[str, tuple[OngoingEvent, ConnectionEvent]] = Latest(TEXTS_KEPT)
         """Events with speech of a person, each as it was last told."""
@@ -197,7 +199,9 @@ class EventWriter:
             event.request = ""
 
     def interject(self, person: str, speech: Seconds, reading: InterjectionReading, at: Seconds) -> None:
-        """Tell what somebody says into the robot's turn. speech: its start."""
+        """Tell what somebody says into the robot's turn; that it begins, once. speech: its start."""
+        if reading == "open" and SpeechStart(person, speech) in self._interjected:
+            return
         words, stamp = self.text_of(person, speech), self.stamp
         told = Interjection(actor=person, since=stamp(speech), at=stamp(at), reading=reading, words=words)
         self._interjected[SpeechStart(person, speech)] = told
