@@ -31,8 +31,8 @@ from engage_hri.services.text.listening import says_words
 LONGEST_UNKNOWN: Seconds = 3.0
 """Time after which it is decided to whom a speech is that still goes on, by the looks so far. Ours."""
 ADDRESSEES_WAIT: Seconds = 1.0
-"""Time after a speech for which its words are waited for, where perception tells words: they may call somebody by
-name, and perception may say to whom they are. Ours."""
+"""Time after a speech for which its words are waited for: perception may say with them to whom they are, if it ever
+has; and the words of who has looked at nobody's face may call somebody by name. Ours."""
 LONGEST_UNTOLD: Seconds = 15.0
 """As `LONGEST_UNKNOWN`, where perception tells addressees: it may do so only with the words, when the speech is over.
 A question of the robot waits so long, at most, until it is known that what somebody else says is no answer. Ours."""
@@ -110,7 +110,8 @@ class Talk(KindRecognizer):
         longest = speech.since + (LONGEST_UNTOLD if self._scene.tells_addressees else LONGEST_UNKNOWN)
         if speech.until is None:
             return longest
-        return min(longest, speech.until + (ADDRESSEES_WAIT if self._scene.is_worded else 0.0))
+        may_call = self._scene.is_worded and not speech.faces.most(speech.since)
+        return min(longest, speech.until + (ADDRESSEES_WAIT if may_call or self._scene.tells_addressees else 0.0))
 
     # -- the person ---------------------------------------------------------------------------------------------
 
