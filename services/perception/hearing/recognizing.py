@@ -54,10 +54,11 @@ class Listening(ABC):
 
 
 class Recognizer(ABC):
-    """A recognizer of speech. It is made once, in the process in which it runs, from `RecognizerSettings`.
+    """A recognizer of speech. It is made once, in the process in which it runs."""
 
-    Raises InputRefused when it is made: a package or a model is missing, or a setting is no good for it.
-    """
+    def __init__(self, settings: RecognizerSettings) -> None:
+        """Load what it needs. Raises InputRefused: a package or a model is missing, or a setting is no good."""
+        super().__init__()
 
     @abstractmethod
     def listen(self) -> Listening:

@@ -35,7 +35,7 @@ def read_wav(file: BinaryIO, name: str) -> Samples:
             channels, width, rate = read.getnchannels(), read.getsampwidth(), read.getframerate()
             content = read.readframes(read.getnframes())
     except (wave.Error, EOFError) as error:
-        reason = f"it is no WAV file that can be read: {error or 'it ends too early'}"
+        reason = f"it is no WAV file that can be read: {str(error) or 'it ends too early'}"
         raise InputRefused(Fault(reason=reason, where=name, advice=ADVICE)) from error
     if width != 2:
         raise InputRefused(Fault(reason=f"its samples have {8 * width} bits, not 16", where=name, advice=ADVICE))
@@ -69,8 +69,10 @@ def resampled(samples: Samples, rate: int) -> Samples:
     return clipped
 
 
-LOST: Seconds = 0.25
-"""Time by which samples may come late before some before them are taken for lost."""
+LATE: Seconds = 0.1
+"""Time by which samples are later than the others from which on some before them may have been lost."""
+FOR: Seconds = 0.5
+"""Time for which all have to be late before that is believed: the machine may stand still."""
 DRIFT = 1e-3
 """Share by which the clock of a device may be slower than ours; those of sound cards differ by less than a tenth."""
 
@@ -80,20 +82,29 @@ class SampleClock:
 
     A sample cannot come before it was captured, and what comes soonest has been on its way for the shortest time. So
     the stream began at the earliest of all beginnings that its pieces let one think of, and a slow clock lets this
-    moment wander later. Where samples were lost, all that follow come late.
+    moment wander later. Where samples were lost, all that follow are late.
     """
 
     def __init__(self) -> None:
         self._begin: Seconds | None = None
         """Loop time of sample 0, as far as one can tell."""
+        self._late: tuple[Seconds, Seconds] | None = None
+        """Since when all were late, and the earliest beginning that they let one think of."""
         self._count = 0
         self._last: Seconds = 0.0
 
     def take(self, count: int, arrived: Seconds) -> Seconds:
         """Take note of the next samples. Returns the loop time of the first. arrived: loop time of their arrival."""
         begin = arrived - (self._count + count) / RATE
-        if self._begin is None or begin > self._begin + LOST:
+        if self._begin is None:
             self._begin = begin
+        if begin <= self._begin + LATE:
+            self._late = None
+        else:
+            since, earliest = self._late or (arrived, begin)
+            self._late = since, min(earliest, begin)
+            if arrived - since >= FOR:
+                self._begin, self._late = self._late[1], None
         self._begin = min(begin, self._begin + DRIFT * max(0.0, arrived - self._last))
         at = self._begin + self._count / RATE
         self._count, self._last = self._count + count, arrived

@@ -26,6 +26,8 @@ FLOOR = 30.0
 """Loudness of noise that is added: where sound is digitally silent the model goes wrong."""
 FRAME, HOP = 512, 128
 """Samples of a frame in which noise is taken out, and from one to the next."""
+SHORTEST = RATE // 10
+"""Samples that may have a word in them."""
 QUIETEST = 0.15
 """Share of the frames that are taken for noise alone."""
 OVER, LEAST = 1.5, 0.25
@@ -61,6 +63,8 @@ class Sphinx(Recognizer):
         return Whole(self._understand)
 
     def _understand(self, samples: Samples) -> Words:
+        if len(samples) < SHORTEST:
+            return Words("")
         self._decoder.start_utt()
         self._decoder.process_raw(without_noise(samples).tobytes(), full_utt=True)
         self._decoder.end_utt()
