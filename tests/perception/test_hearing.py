@@ -23,7 +23,7 @@ from engage_hri.services.commandline.embedding import EmbeddedRobot
 from engage_hri.services.perception.hearing import service
 from engage_hri.services.perception.hearing.config import HearingConfig
 from engage_hri.services.perception.hearing.microphone import SoundLost
-from engage_hri.services.perception.hearing.recognizing import Listening, Recognizer, Words
+from engage_hri.services.perception.hearing.recognizing import Listening, SpeechRecognizer, SpeechWords
 from engage_hri.services.perception.hearing.service import LOOK_AROUND, VISITOR, hear
 from engage_hri.services.perception.hearing.sound import Piece
 from engage_hri.services.perception.hearing.voice import RATE
@@ -241,7 +241,7 @@ async def test_a_microphone_that_goes_ends_the_speech_is_told_once_and_tried_aga
     assert 0.3 < until - since <= 1.0
 
 
-class Failing(Recognizer):
+class Failing(SpeechRecognizer):
     def listen(self) -> Listening:
         return FailingListening()
 
@@ -250,7 +250,7 @@ class FailingListening(Listening):
     def hear(self, samples: Any) -> str:
         return f"{len(samples)}"
 
-    def end(self) -> Words:
+    def end(self) -> SpeechWords:
         raise RuntimeError("out of memory")
 
 

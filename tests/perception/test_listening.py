@@ -14,10 +14,10 @@ from engage_hri.services.perception.hearing.listening import InItsOwn, Order
 from engage_hri.services.perception.hearing.microphone import SoundLost, command, pieces
 from engage_hri.services.perception.hearing.recognizing import (
     Answer,
-    Failed,
-    Known,
+    KnownWords,
+    NotUnderstood,
     RecognizerSettings,
-    Words,
+    SpeechWords,
 )
 from engage_hri.services.perception.hearing.sound import Piece
 from engage_hri.services.runtime.installation import RECOGNIZERS, offers
@@ -26,9 +26,9 @@ pytestmark = pytest.mark.real_time
 
 ODD = """
 import os, time
-from engage_hri.services.perception.hearing.recognizing import Listening, Recognizer, Words
+from engage_hri.services.perception.hearing.recognizing import SpeechWords, Listening, SpeechRecognizer
 
-class Odd(Recognizer):
+class Odd(SpeechRecognizer):
     def __init__(self, settings):
         print("engines print")
         if settings.model == "none":
@@ -48,12 +48,12 @@ class OddListening(Listening):
         return str(len(samples))
 
     def end(self):
-        return Words("over")
+        return SpeechWords("over")
 """
 Install = Callable[..., None]
 
 
-class Ear:
+class VoiceEar:
     """A recognizer at work, and its answers."""
 
     def __init__(self, install: Install, model: str = "") -> None:
@@ -64,7 +64,7 @@ class Ear:
 
     def _take(self, answer: Answer) -> None:
         self.answers.append(answer)
-        if isinstance(answer, Failed) or answer.final:
+        if isinstance(answer, NotUnderstood) or answer.final:
             self.last.set()
 
     async def said(self, speech: int, *counts: int) -> list[Answer]:
@@ -78,46 +78,47 @@ class Ear:
 
 
 @pytest.fixture
-def odd(install: Install, request: pytest.FixtureRequest) -> Callable[[str], Ear]:
-    return lambda model="": Ear(install, model)
+def odd(install: Install, request: pytest.FixtureRequest) -> Callable[[str], VoiceEar]:
+    return lambda model="": VoiceEar(install, model)
 
 
-async def test_a_recognizer_answers_from_its_process(odd: Callable[..., Ear]):
+async def test_a_recognizer_answers_from_its_process(odd: Callable[..., VoiceEar]):
     ear = odd()
     await ear.work.made()
 
-    assert await ear.said(1, 10, 20) == [
-        Known(1, Words("10"), False), Known(1, Words("20"), False), Known(1, Words("over"), True)
-    ]  # fmt: skip
+    told = [("10", False), ("20", False), ("over", True)]
+    assert await ear.said(1, 10, 20) == [KnownWords(1, SpeechWords(text), final) for text, final in told]
     ear.work.close()
 
 
-async def test_a_recognizer_that_dies_costs_one_speech(odd: Callable[..., Ear]):
+async def test_a_recognizer_that_dies_costs_one_speech(odd: Callable[..., VoiceEar]):
     ear = odd()
     await ear.work.made()
 
     [failed] = await ear.said(1, 7)
-    assert isinstance(failed, Failed)
+    assert isinstance(failed, NotUnderstood)
     assert failed.fault.reason == "the recognizer odd has ended with code 3: engines print"
-    assert (await ear.said(2, 10))[-1] == Known(2, Words("over"), True)
+    assert (await ear.said(2, 10))[-1] == KnownWords(2, SpeechWords("over"), True)
     ear.work.close()
 
 
-async def test_a_recognizer_that_freezes_costs_one_speech(odd: Callable[..., Ear], monkeypatch: pytest.MonkeyPatch):
+async def test_a_recognizer_that_freezes_costs_one_speech(
+    odd: Callable[..., VoiceEar], monkeypatch: pytest.MonkeyPatch
+):
     monkeypatch.setattr(listening, "LIMIT", 1.0)
     ear = odd()
     await ear.work.made()
 
     [failed] = await ear.said(1, 8)
-    assert isinstance(failed, Failed)
+    assert isinstance(failed, NotUnderstood)
     assert failed.fault.reason == "the recognizer odd does not answer for 1 s"
     monkeypatch.setattr(listening, "LIMIT", 20.0)
-    assert (await ear.said(2, 10))[-1] == Known(2, Words("over"), True)
+    assert (await ear.said(2, 10))[-1] == KnownWords(2, SpeechWords("over"), True)
     ear.work.close()
 
 
 async def test_a_recognizer_that_cannot_be_made_is_refused(
-    odd: Callable[..., Ear], monkeypatch: pytest.MonkeyPatch, install: Install
+    odd: Callable[..., VoiceEar], monkeypatch: pytest.MonkeyPatch, install: Install
 ):
     ear = odd("none")
     with pytest.raises(InputRefused, match="odd cannot be made: OSError: no such file"):
@@ -228,9 +229,9 @@ async def test_a_server_that_transcribes_gets_the_speech_as_a_file(kind: str, mo
     assert b"RIFF" in request
     assert b"WAVE" in request
     if kind == "yes":
-        assert answers == [Known(1, Words("Yes."), True)]
+        assert answers == [KnownWords(1, SpeechWords("Yes."), True)]
     else:
         [failed] = answers
-        assert isinstance(failed, Failed)
+        assert isinstance(failed, NotUnderstood)
         expected = {"broken": "500 It: out of memory", "odd": "no JSON object with a `text`"}[kind]
         assert expected in failed.fault.reason

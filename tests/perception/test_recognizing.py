@@ -10,14 +10,14 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.perception.hearing.listening import found
 from engage_hri.services.perception.hearing.recognizing import (
     Desk,
-    Failed,
-    Known,
+    KnownWords,
     Listening,
-    Recognizer,
+    NotUnderstood,
     RecognizerSettings,
     Sound,
+    SpeechRecognizer,
+    SpeechWords,
     Whole,
-    Words,
 )
 from engage_hri.services.perception.hearing.voice import Samples
 from tests.perception.spoken import PHRASES, VOICES, spoken
@@ -37,11 +37,11 @@ class Counting(Listening):
         self.heard += len(samples)
         return f"  {self.heard // 10 * 10}"
 
-    def end(self) -> Words:
-        return Words(f"{self.heard} in  all", 0.5)
+    def end(self) -> SpeechWords:
+        return SpeechWords(f"{self.heard} in  all", 0.5)
 
 
-class Counters(Recognizer):
+class Counters(SpeechRecognizer):
     def listen(self) -> Listening:
         return Counting()
 
@@ -53,29 +53,29 @@ def sound(count: int) -> bytes:
 def test_words_are_told_when_they_change_and_in_the_end_for_good():
     desk = Desk(Counters(RecognizerSettings()))
 
-    assert [*desk.take(Sound(1, sound(10)))] == [Known(1, Words("10"), final=False)]
+    assert [*desk.take(Sound(1, sound(10)))] == [KnownWords(1, SpeechWords("10"), final=False)]
     assert [*desk.take(Sound(1, sound(3)))] == []
-    assert [*desk.take(Sound(2, sound(20)))] == [Known(2, Words("20"), final=False)]
-    assert [*desk.take(Sound(1, b""))] == [Known(1, Words("13 in all", 0.5), final=True)]
-    assert [*desk.take(Sound(2, b""))] == [Known(2, Words("20 in all", 0.5), final=True)]
+    assert [*desk.take(Sound(2, sound(20)))] == [KnownWords(2, SpeechWords("20"), final=False)]
+    assert [*desk.take(Sound(1, b""))] == [KnownWords(1, SpeechWords("13 in all", 0.5), final=True)]
+    assert [*desk.take(Sound(2, b""))] == [KnownWords(2, SpeechWords("20 in all", 0.5), final=True)]
 
 
 def test_a_speech_at_which_an_engine_fails_is_given_up_and_the_next_is_heard():
     desk = Desk(Counters(RecognizerSettings()))
 
     [failed] = desk.take(Sound(1, sound(99)))
-    assert isinstance(failed, Failed)
+    assert isinstance(failed, NotUnderstood)
     assert failed.fault.reason == "the recognizer fails: RuntimeError: oops"
     assert [*desk.take(Sound(1, sound(10))), *desk.take(Sound(1, b""))] == []
-    assert [*desk.take(Sound(2, b""))] == [Known(2, Words("0 in all", 0.5), final=True)]
+    assert [*desk.take(Sound(2, b""))] == [KnownWords(2, SpeechWords("0 in all", 0.5), final=True)]
 
 
 def test_a_whole_speech_is_understood_at_its_end():
-    whole = Whole(lambda samples: Words(str(len(samples))))
+    whole = Whole(lambda samples: SpeechWords(str(len(samples))))
 
     assert whole.hear(np.zeros(5, np.int16)) == whole.hear(np.zeros(7, np.int16)) == ""
-    assert whole.end() == Words("12")
-    assert Whole(lambda samples: Words(str(len(samples)))).end() == Words("0")
+    assert whole.end() == SpeechWords("12")
+    assert Whole(lambda samples: SpeechWords(str(len(samples)))).end() == SpeechWords("0")
 
 
 def test_a_recognizer_of_another_package_is_found_by_its_name(install):
@@ -104,46 +104,46 @@ def test_what_is_missing_is_told_with_what_to_do(name: str, settings: Recognizer
 
 
 @cache
-def for_phrases() -> Recognizer:
+def for_phrases() -> SpeechRecognizer:
     return found("sphinx", RecognizerSettings(phrases=tuple(phrase.capitalize() + "!" for phrase in PHRASES)))
 
 
 class TestSphinx:
     @pytest.fixture
-    def sphinx(self) -> Recognizer:
+    def sphinx(self) -> SpeechRecognizer:
         pytest.importorskip("pocketsphinx", reason="pip install pocketsphinx")
         return for_phrases()
 
-    def understood(self, sphinx: Recognizer, text: str, variant: str, noise: float | None = None) -> str:
+    def understood(self, sphinx: SpeechRecognizer, text: str, variant: str, noise: float | None = None) -> str:
         said = spoken(text, variant, before=0.3, after=0.3, noise=noise)
         listening = sphinx.listen()
         listening.hear(said.samples)
         return listening.end().text
 
-    def test_known_phrases_are_understood_as_they_are_written_in_the_settings(self, sphinx: Recognizer):
+    def test_known_phrases_are_understood_as_they_are_written_in_the_settings(self, sphinx: SpeechRecognizer):
         for variant in VOICES:
             assert [self.understood(sphinx, text, variant) for text in PHRASES] == [
                 phrase.capitalize() + "!" for phrase in PHRASES
             ]
 
-    def test_of_other_sentences_nothing_is_made_up(self, sphinx: Recognizer):
+    def test_of_other_sentences_nothing_is_made_up(self, sphinx: SpeechRecognizer):
         assert [self.understood(sphinx, text, "") for text in OTHER] == [""] * len(OTHER)
 
-    def test_in_noise_most_phrases_are_understood(self, sphinx: Recognizer):
+    def test_in_noise_most_phrases_are_understood(self, sphinx: SpeechRecognizer):
         wrong = [text for text in PHRASES if text not in self.understood(sphinx, text, "", 10.0).lower()]
         assert len(wrong) <= 2
 
-    def test_it_needs_phrases_of_words_that_it_knows(self, sphinx: Recognizer):
+    def test_it_needs_phrases_of_words_that_it_knows(self, sphinx: SpeechRecognizer):
         with pytest.raises(InputRefused, match="needs the phrases"):
             found("sphinx", RecognizerSettings())
         with pytest.raises(InputRefused, match="the dictionary has no 'xqzzy'"):
             found("sphinx", RecognizerSettings(phrases=("hello", "say xqzzy")))
 
-    def test_silence_and_next_to_no_sound_have_no_words(self, sphinx: Recognizer):
+    def test_silence_and_next_to_no_sound_have_no_words(self, sphinx: SpeechRecognizer):
         for count in (0, 1, 100, 16000):
             listening = sphinx.listen()
             listening.hear(np.zeros(count, np.int16))
-            assert listening.end() == Words("")
+            assert listening.end() == SpeechWords("")
 
 
 def test_a_recognizer_that_is_no_package_of_python_is_refused_by_path(tmp_path: Path):

@@ -15,8 +15,8 @@ from engage_hri.services.perception.hearing.voice import (
     LONGEST,
     RATE,
     WINDOW,
-    Ear,
     VoiceBegan,
+    VoiceEar,
     VoiceEnded,
     VoiceEvent,
     VoiceSound,
@@ -35,7 +35,7 @@ def edges(told: Iterable[VoiceEvent]) -> list[VoiceEvent]:
 def judged(likelihoods: list[float], pause: float = PAUSE) -> list[VoiceEvent]:
     """What an ear tells of windows with these likelihoods, one piece each; the sound of a window is its number."""
     rest = iter(likelihoods)
-    ear = Ear(lambda window: next(rest), pause)
+    ear = VoiceEar(lambda window: next(rest), pause)
     told = []
     for number in range(len(likelihoods)):
         told += ear.feed(np.full(WINDOW, number, np.int16), number * LENGTH)
@@ -76,7 +76,7 @@ def test_a_voice_without_end_is_told_as_several():
 
 
 def test_where_sound_is_missing_a_voice_has_ended_and_nothing_is_heard_across_the_gap():
-    ear = Ear(lambda window: 1.0, PAUSE)
+    ear = VoiceEar(lambda window: 1.0, PAUSE)
     told = ear.feed(np.zeros(5 * WINDOW + 100, np.int16), 0.0)
     assert edges(told) == [VoiceBegan(0.0)]
 
@@ -95,7 +95,7 @@ def test_it_does_not_matter_how_sound_is_cut_into_pieces(sizes: list[int]):
     def loudness(window: np.ndarray) -> float:
         return float(np.abs(window).max() > 0.01)
 
-    whole, cut = Ear(loudness, PAUSE), Ear(loudness, PAUSE)
+    whole, cut = VoiceEar(loudness, PAUSE), VoiceEar(loudness, PAUSE)
     told, at = [], 0
     for size in [*sizes, len(sound)]:
         told += cut.feed(sound[at : at + size], at / RATE)
@@ -112,7 +112,7 @@ def test_onsets_and_ends_of_spoken_phrases_are_where_they_can_be_heard(noise: fl
     for variant in VOICES:
         for text in PHRASES:
             sound = spoken(text, variant, noise=noise)
-            ear, told = Ear(silero(), PAUSE), []
+            ear, told = VoiceEar(silero(), PAUSE), []
             for at in range(0, len(sound.samples), 320):
                 fed = edges(ear.feed(sound.samples[at : at + 320], at / RATE))
                 known += [(at + 320) / RATE - sound.since for event in fed if isinstance(event, VoiceBegan)]
@@ -129,6 +129,6 @@ def test_onsets_and_ends_of_spoken_phrases_are_where_they_can_be_heard(noise: fl
 def test_no_voice_is_heard_in_silence_and_noise():
     from tests.perception.spoken import pink
 
-    ear = Ear(silero(), PAUSE)
+    ear = VoiceEar(silero(), PAUSE)
     assert ear.feed(np.zeros(5 * RATE, np.int16), 0.0) == []
     assert ear.feed((pink(20 * RATE) * 3000).astype(np.int16), 5.0) == []

@@ -16,7 +16,7 @@ PATIENCE = 0.5
 """Seconds for which the loop waits at most for one that was killed: the system ends it at once, or hangs itself."""
 
 
-class Child:
+class PipedProcess:
     """A process. It is ended by `close`, or ends by itself.
 
     unsent: bytes that it has still to read.

@@ -21,14 +21,14 @@ import msgspec
 from engage_hri.schemas.advice import suggestion
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.perception.hearing.child import Child
+from engage_hri.services.perception.hearing.child import PipedProcess
 from engage_hri.services.perception.hearing.recognizing import (
     Answer,
     Desk,
-    Failed,
-    Recognizer,
+    NotUnderstood,
     RecognizerSettings,
     Sound,
+    SpeechRecognizer,
 )
 from engage_hri.services.runtime.installation import RECOGNIZERS, offers
 
@@ -57,13 +57,13 @@ class Made(msgspec.Struct, frozen=True, tag=True):
     fault: Fault | None = None
 
 
-def found(name: str, settings: RecognizerSettings) -> Recognizer:
+def found(name: str, settings: RecognizerSettings) -> SpeechRecognizer:
     """Find a recognizer, import it and make it. Raises InputRefused."""
     offered = offers(RECOGNIZERS)
     for offer in offered:
         if offer.name == name:
             try:
-                made: Recognizer = offer.load()(settings)
+                made: SpeechRecognizer = offer.load()(settings)
             except ImportError as error:
                 advice = offer.advice(error)
                 raise InputRefused(Fault(reason=str(error), where="hearing.recognizer", advice=advice)) from error
@@ -115,7 +115,7 @@ class InItsOwn(Understanding):
     def __init__(self, order: Order, on_answer: OnAnswer) -> None:
         self._order, self._on_answer = order, on_answer
         self._loop = asyncio.get_running_loop()
-        self._child: Child | None = None
+        self._child: PipedProcess | None = None
         self._buffer = bytearray()
         self._made: asyncio.Future[None] = self._loop.create_future()
         self._open: dict[int, asyncio.TimerHandle | None] = {}
@@ -157,7 +157,7 @@ class InItsOwn(Understanding):
     def _start(self) -> None:
         self._buffer.clear()
         command = [sys.executable, "-m", "engage_hri.services.perception.hearing.listening"]
-        self._child = Child(command, self._take, self._lose)
+        self._child = PipedProcess(command, self._take, self._lose)
         self._child.write(_packed(self._order))
 
     def _take(self, more: bytes) -> None:
@@ -177,11 +177,11 @@ class InItsOwn(Understanding):
             elif not self._made.done():
                 self._made.set_result(None)
             return
-        if isinstance(answer, Failed) or answer.final:
+        if isinstance(answer, NotUnderstood) or answer.final:
             timer = self._open.pop(answer.speech, None)
             if timer is not None:
                 timer.cancel()
-            elif isinstance(answer, Failed):
+            elif isinstance(answer, NotUnderstood):
                 self._failed.append(answer.speech)
         self._on_answer(answer)
 
@@ -193,7 +193,7 @@ class InItsOwn(Understanding):
             self._made.set_exception(InputRefused(fault))
         for speech in lost:
             self._failed.append(speech)
-            self._on_answer(Failed(speech, fault))
+            self._on_answer(NotUnderstood(speech, fault))
 
 
 # -- its process ---------------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ import numpy as np
 
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.perception.hearing.child import Child
+from engage_hri.services.perception.hearing.child import PipedProcess
 from engage_hri.services.perception.hearing.sound import Piece, SampleClock, read_wav
 from engage_hri.services.perception.hearing.voice import RATE
 from engage_hri.services.runtime.installation import packages_command
@@ -105,7 +105,7 @@ async def recorded(program: tuple[str, ...], channels: int) -> AsyncGenerator[Pi
         return SoundLost(Fault(reason=f"the microphone: {program[0]} {how}", where="hearing.source", advice=advice))
 
     try:
-        child = Child(program, take, ended)
+        child = PipedProcess(program, take, ended)
     except OSError as error:
         raise lost(f"does not start: {error.strerror or error}") from error
     try:

@@ -1,6 +1,6 @@
-"""What a recognizer is, and the desk at which it works: sound of speeches in, words out. Pure.
+"""Recognizers of speech, and the desk at which one works: sound of speeches in, words out. Pure.
 
-    class MyRecognizer(Recognizer):
+    class MyRecognizer(SpeechRecognizer):
         def __init__(self, settings: RecognizerSettings) -> None:
             self.model = engine.load(settings.model)
 
@@ -34,7 +34,7 @@ class RecognizerSettings(Struct, frozen=True, kw_only=True):
     address: str = ""
 
 
-class Words(Struct, frozen=True):
+class SpeechWords(Struct, frozen=True):
     """Words of a speech. text: empty: there are none in it. confidence: in these words."""
 
     text: str
@@ -49,11 +49,11 @@ class Listening(ABC):
         """Take more of the sound: 16 kHz, one channel. Returns the words as far as they are known now, or nothing."""
 
     @abstractmethod
-    def end(self) -> Words:
+    def end(self) -> SpeechWords:
         """Take note that the speech is over. Returns its words."""
 
 
-class Recognizer(ABC):
+class SpeechRecognizer(ABC):
     """A recognizer of speech. It is made once, in the process in which it runs."""
 
     def __init__(self, settings: RecognizerSettings) -> None:
@@ -71,7 +71,7 @@ class Whole(Listening):
     understand: makes words of the whole sound.
     """
 
-    def __init__(self, understand: Callable[[Samples], Words]) -> None:
+    def __init__(self, understand: Callable[[Samples], SpeechWords]) -> None:
         self._understand = understand
         self._heard: list[Samples] = []
 
@@ -79,7 +79,7 @@ class Whole(Listening):
         self._heard.append(samples)
         return ""
 
-    def end(self) -> Words:
+    def end(self) -> SpeechWords:
         return self._understand(np.concatenate([np.zeros(0, np.int16), *self._heard]))
 
 
@@ -105,28 +105,28 @@ class Sound(Struct, frozen=True, tag=True):
     samples: bytes
 
 
-class Known(Struct, frozen=True, tag=True):
+class KnownWords(Struct, frozen=True, tag=True):
     """Answer: the words of a speech, as far as they are known."""
 
     speech: int
-    words: Words
+    words: SpeechWords
     final: bool
 
 
-class Failed(Struct, frozen=True, tag=True):
+class NotUnderstood(Struct, frozen=True, tag=True):
     """Answer: a speech was not understood, for the recognizer has failed."""
 
     speech: int
     fault: Fault
 
 
-Answer = Known | Failed
+Answer = KnownWords | NotUnderstood
 
 
 class Desk:
     """The desk of a recognizer. A speech that fails is given up; the next one begins anew."""
 
-    def __init__(self, recognizer: Recognizer) -> None:
+    def __init__(self, recognizer: SpeechRecognizer) -> None:
         self._recognizer = recognizer
         self._speeches: dict[int, tuple[Listening | None, str]] = {}
         """By number: who hears it, None if it was given up, and the words that were told."""
@@ -142,13 +142,15 @@ class Desk:
                 )
                 if text and text != told:
                     self._speeches[order.speech] = listening, text
-                    yield Known(order.speech, Words(text), final=False)
+                    yield KnownWords(order.speech, SpeechWords(text), final=False)
             elif listening is not None:
                 words = listening.end()
-                yield Known(order.speech, Words(" ".join(words.text.split()), words.confidence), final=True)
+                yield KnownWords(
+                    order.speech, SpeechWords(" ".join(words.text.split()), words.confidence), final=True
+                )
         except Exception as error:  # whatever an engine raises: it ends this speech, and no other
             self._speeches[order.speech] = None, ""
             reason = f"the recognizer fails: {type(error).__name__}: {error}"
-            yield Failed(order.speech, error.fault if isinstance(error, EngageError) else Fault(reason=reason))
+            yield NotUnderstood(order.speech, error.fault if isinstance(error, EngageError) else Fault(reason=reason))
         if not order.samples:
             del self._speeches[order.speech]

@@ -33,9 +33,16 @@ from engage_hri.services.client.people.shared_world import SharedWorld
 from engage_hri.services.perception.hearing.config import HearingConfig
 from engage_hri.services.perception.hearing.listening import InItsOwn, InThisProcess, Order, Understanding
 from engage_hri.services.perception.hearing.microphone import SoundLost, is_file, pieces
-from engage_hri.services.perception.hearing.recognizing import Answer, Known, RecognizerSettings, Words
+from engage_hri.services.perception.hearing.recognizing import Answer, KnownWords, RecognizerSettings, SpeechWords
 from engage_hri.services.perception.hearing.sound import Piece
-from engage_hri.services.perception.hearing.voice import Ear, VoiceBegan, VoiceEnded, VoiceEvent, VoiceSound, silero
+from engage_hri.services.perception.hearing.voice import (
+    VoiceBegan,
+    VoiceEar,
+    VoiceEnded,
+    VoiceEvent,
+    VoiceSound,
+    silero,
+)
 from engage_hri.services.runtime.installation import extra_command
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
@@ -86,7 +93,7 @@ class _Hearing:
         self._bus, self._config = bus, config
         self._channels = max(1, len(config.people))
         try:
-            self._ears = [Ear(silero(), config.pause) for _ in range(self._channels)]
+            self._ears = [VoiceEar(silero(), config.pause) for _ in range(self._channels)]
         except ModuleNotFoundError as error:
             raise InputRefused(Fault(reason=str(error), where="hearing", advice=extra_command("hearing"))) from error
         self._world, self._perceived = SharedWorld(bus.name), PerceivedActions(bus)
@@ -245,8 +252,8 @@ class _Hearing:
         speech = self._awaited.get(answer.speech)
         if speech is None:
             return
-        words, is_final = Words(""), True
-        if isinstance(answer, Known):
+        words, is_final = SpeechWords(""), True
+        if isinstance(answer, KnownWords):
             words, is_final = answer.words, answer.final
         else:
             self._publish(answer.fault)

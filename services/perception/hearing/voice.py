@@ -67,7 +67,7 @@ class VoiceEnded(Struct, frozen=True):
 VoiceEvent = VoiceBegan | VoiceSound | VoiceEnded
 
 
-class Ear:
+class VoiceEar:
     """One channel of sound, with one person's voice."""
 
     def __init__(self, judge: Judge, pause: Seconds) -> None:

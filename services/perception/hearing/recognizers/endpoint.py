@@ -14,10 +14,10 @@ from urllib.request import Request, urlopen
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.services.perception.hearing.recognizing import (
     Listening,
-    Recognizer,
     RecognizerSettings,
+    SpeechRecognizer,
+    SpeechWords,
     Whole,
-    Words,
 )
 from engage_hri.services.perception.hearing.voice import RATE, Samples
 
@@ -27,7 +27,7 @@ PATIENCE = 15.0
 BOUNDARY = "engage-7d1f3c0b9a54"
 
 
-class Endpoint(Recognizer):
+class Endpoint(SpeechRecognizer):
     """A recognizer on a server."""
 
     def __init__(self, settings: RecognizerSettings) -> None:
@@ -43,14 +43,14 @@ class Endpoint(Recognizer):
     def listen(self) -> Listening:
         return Whole(self._understand)
 
-    def _understand(self, samples: Samples) -> Words:
+    def _understand(self, samples: Samples) -> SpeechWords:
         headers = {"Content-Type": f"multipart/form-data; boundary={BOUNDARY}"}
         if key := os.environ.get(KEY):
             headers["Authorization"] = f"Bearer {key}"
         request = Request(self._address, _form(self._fields, _wav(samples)), headers)
         try:
             with urlopen(request, timeout=PATIENCE) as answer:
-                return Words(str(json.loads(answer.read())["text"]))
+                return SpeechWords(str(json.loads(answer.read())["text"]))
         except HTTPError as error:
             said = error.read(300).decode(errors="replace")
             raise _failed(self._address, f"{error.code} {error.reason}: {said}") from error

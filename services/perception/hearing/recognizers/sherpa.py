@@ -7,10 +7,10 @@ import numpy as np
 
 from engage_hri.services.perception.hearing.recognizing import (
     Listening,
-    Recognizer,
     RecognizerSettings,
+    SpeechRecognizer,
+    SpeechWords,
     Whole,
-    Words,
     missing,
     no_model,
 )
@@ -23,7 +23,7 @@ TAIL = RATE // 2
 """Samples of silence after a speech, so that a streaming model says its last words."""
 
 
-class Sherpa(Recognizer):
+class Sherpa(SpeechRecognizer):
     """A recognizer with a model for sherpa-onnx: with a joiner it understands while somebody speaks."""
 
     def __init__(self, settings: RecognizerSettings) -> None:
@@ -49,11 +49,11 @@ class Sherpa(Recognizer):
     def listen(self) -> Listening:
         return _SherpaListening(self._engine) if self._is_streaming else Whole(self._understand)
 
-    def _understand(self, samples: Samples) -> Words:
+    def _understand(self, samples: Samples) -> SpeechWords:
         stream = self._engine.create_stream()
         stream.accept_waveform(RATE, _floats(samples))
         self._engine.decode_stream(stream)
-        return Words(stream.result.text)
+        return SpeechWords(stream.result.text)
 
 
 class _SherpaListening(Listening):
@@ -65,10 +65,10 @@ class _SherpaListening(Listening):
         self._stream.accept_waveform(RATE, _floats(samples))
         return self._known()
 
-    def end(self) -> Words:
+    def end(self) -> SpeechWords:
         self._stream.accept_waveform(RATE, np.zeros(TAIL, np.float32))
         self._stream.input_finished()
-        return Words(self._known())
+        return SpeechWords(self._known())
 
     def _known(self) -> str:
         while self._engine.is_ready(self._stream):

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.perception.hearing.recognizing import (
     Listening,
-    Recognizer,
     RecognizerSettings,
+    SpeechRecognizer,
+    SpeechWords,
     Whole,
-    Words,
     missing,
 )
 from engage_hri.services.perception.hearing.voice import RATE, Samples
@@ -36,7 +36,7 @@ FIT = -4.0
 """Fit of sound and phrase, a logarithm for each frame, below which it was something else: by trial."""
 
 
-class Sphinx(Recognizer):
+class Sphinx(SpeechRecognizer):
     """A recognizer for known phrases."""
 
     def __init__(self, settings: RecognizerSettings) -> None:
@@ -62,19 +62,19 @@ class Sphinx(Recognizer):
     def listen(self) -> Listening:
         return Whole(self._understand)
 
-    def _understand(self, samples: Samples) -> Words:
+    def _understand(self, samples: Samples) -> SpeechWords:
         if len(samples) < SHORTEST:
-            return Words("")
+            return SpeechWords("")
         self._decoder.start_utt()
         self._decoder.process_raw(without_noise(samples).tobytes(), full_utt=True)
         self._decoder.end_utt()
         found = self._decoder.hyp()
         if found is None:
-            return Words("")
+            return SpeechWords("")
         parts = [*self._decoder.seg()]
         frames = 1 + parts[-1].end_frame
         fit = sum(log(max(part.ascore, 1e-300)) for part in parts) / frames
-        return Words(self._phrases.get(found.hypstr.strip(), "") if fit >= FIT else "")
+        return SpeechWords(self._phrases.get(found.hypstr.strip(), "") if fit >= FIT else "")
 
 
 def _plain(phrase: str) -> str:

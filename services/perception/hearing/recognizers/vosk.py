@@ -8,16 +8,16 @@ from typing import Any
 
 from engage_hri.services.perception.hearing.recognizing import (
     Listening,
-    Recognizer,
     RecognizerSettings,
-    Words,
+    SpeechRecognizer,
+    SpeechWords,
     missing,
     no_model,
 )
 from engage_hri.services.perception.hearing.voice import RATE, Samples
 
 
-class Vosk(Recognizer):
+class Vosk(SpeechRecognizer):
     """A recognizer with a Vosk model. With phrases it understands nothing else."""
 
     def __init__(self, settings: RecognizerSettings) -> None:
@@ -51,9 +51,9 @@ class _VoskListening(Listening):
             return " ".join(self._said)
         return " ".join([*self._said, json.loads(self._decoder.PartialResult())["partial"]])
 
-    def end(self) -> Words:
+    def end(self) -> SpeechWords:
         self._finished(self._decoder.FinalResult())
-        return Words(" ".join(self._said), min(self._sure, default=1.0))
+        return SpeechWords(" ".join(self._said), min(self._sure, default=1.0))
 
     def _finished(self, told: str) -> None:
         result = json.loads(told)

@@ -9,10 +9,10 @@ import numpy as np
 
 from engage_hri.services.perception.hearing.recognizing import (
     Listening,
-    Recognizer,
     RecognizerSettings,
+    SpeechRecognizer,
+    SpeechWords,
     Whole,
-    Words,
     missing,
     no_model,
 )
@@ -22,7 +22,7 @@ NO_SPEECH = 0.6
 """Likelihood from which on there was no speech in a sound, whatever words it makes up: Whisper's own limit."""
 
 
-class Whisper(Recognizer):
+class Whisper(SpeechRecognizer):
     """A recognizer with a Whisper model."""
 
     def __init__(self, settings: RecognizerSettings) -> None:
@@ -40,13 +40,13 @@ class Whisper(Recognizer):
     def listen(self) -> Listening:
         return Whole(self._understand)
 
-    def _understand(self, samples: Samples) -> Words:
+    def _understand(self, samples: Samples) -> SpeechWords:
         if len(samples) < RATE // 10:
-            return Words("")
+            return SpeechWords("")
         found, _ = self._model.transcribe(
             samples.astype(np.float32) / 32768, language=self._language, beam_size=1, without_timestamps=True,
             condition_on_previous_text=False, initial_prompt=self._expected,
         )  # fmt: skip
         parts = [each for each in found if each.no_speech_prob < NO_SPEECH or each.avg_logprob > -1.0]
         sure = min((exp(min(0.0, each.avg_logprob)) for each in parts), default=1.0)
-        return Words(" ".join(each.text.strip() for each in parts), sure)
+        return SpeechWords(" ".join(each.text.strip() for each in parts), sure)
