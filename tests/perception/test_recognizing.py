@@ -14,7 +14,7 @@ from engage_hri.services.perception.hearing.recognizing import (
     Listening,
     NotUnderstood,
     RecognizerSettings,
-    Sound,
+    SpeechOrder,
     SpeechRecognizer,
     SpeechWords,
     Whole,
@@ -53,21 +53,21 @@ def sound(count: int) -> bytes:
 def test_words_are_told_when_they_change_and_in_the_end_for_good():
     desk = Desk(Counters(RecognizerSettings()))
 
-    assert [*desk.take(Sound(1, sound(10)))] == [KnownWords(1, SpeechWords("10"), final=False)]
-    assert [*desk.take(Sound(1, sound(3)))] == []
-    assert [*desk.take(Sound(2, sound(20)))] == [KnownWords(2, SpeechWords("20"), final=False)]
-    assert [*desk.take(Sound(1, b""))] == [KnownWords(1, SpeechWords("13 in all", 0.5), final=True)]
-    assert [*desk.take(Sound(2, b""))] == [KnownWords(2, SpeechWords("20 in all", 0.5), final=True)]
+    assert [*desk.take(SpeechOrder(1, sound(10)))] == [KnownWords(1, SpeechWords("10"), final=False)]
+    assert [*desk.take(SpeechOrder(1, sound(3)))] == []
+    assert [*desk.take(SpeechOrder(2, sound(20)))] == [KnownWords(2, SpeechWords("20"), final=False)]
+    assert [*desk.take(SpeechOrder(1, b""))] == [KnownWords(1, SpeechWords("13 in all", 0.5), final=True)]
+    assert [*desk.take(SpeechOrder(2, b""))] == [KnownWords(2, SpeechWords("20 in all", 0.5), final=True)]
 
 
 def test_a_speech_at_which_an_engine_fails_is_given_up_and_the_next_is_heard():
     desk = Desk(Counters(RecognizerSettings()))
 
-    [failed] = desk.take(Sound(1, sound(99)))
+    [failed] = desk.take(SpeechOrder(1, sound(99)))
     assert isinstance(failed, NotUnderstood)
     assert failed.fault.reason == "the recognizer fails: RuntimeError: oops"
-    assert [*desk.take(Sound(1, sound(10))), *desk.take(Sound(1, b""))] == []
-    assert [*desk.take(Sound(2, b""))] == [KnownWords(2, SpeechWords("0 in all", 0.5), final=True)]
+    assert [*desk.take(SpeechOrder(1, sound(10))), *desk.take(SpeechOrder(1, b""))] == []
+    assert [*desk.take(SpeechOrder(2, b""))] == [KnownWords(2, SpeechWords("0 in all", 0.5), final=True)]
 
 
 def test_a_whole_speech_is_understood_at_its_end():

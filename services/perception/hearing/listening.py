@@ -27,7 +27,7 @@ from engage_hri.services.perception.hearing.recognizing import (
     Desk,
     NotUnderstood,
     RecognizerSettings,
-    Sound,
+    SpeechOrder,
     SpeechRecognizer,
 )
 from engage_hri.services.runtime.installation import RECOGNIZERS, offers
@@ -101,7 +101,7 @@ class InThisProcess(Understanding):
 
     def hear(self, speech: int, samples: bytes) -> None:
         assert self._desk is not None
-        for answer in self._desk.take(Sound(speech, samples)):
+        for answer in self._desk.take(SpeechOrder(speech, samples)):
             self._on_answer(answer)
 
     def close(self) -> None:
@@ -139,7 +139,7 @@ class InItsOwn(Understanding):
         if self._child is None:
             return
         self._open.setdefault(speech, None)
-        self._child.write(_packed(Sound(speech, samples)))
+        self._child.write(_packed(SpeechOrder(speech, samples)))
         if not samples:
             self._open[speech] = self._loop.call_later(LIMIT, self._lose, f"does not answer for {LIMIT:g} s")
         elif self._child.unsent > MOST_UNREAD:
@@ -232,7 +232,7 @@ def main() -> None:
         answer(Made(error.fault if isinstance(error, EngageError) else Fault(reason=reason)))
         return
     answer(Made())
-    while (sound := _unpacked(sys.stdin.buffer, Sound)) is not None:
+    while (sound := _unpacked(sys.stdin.buffer, SpeechOrder)) is not None:
         for each in desk.take(sound):
             answer(each)
 

@@ -22,6 +22,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.units import Probability
+from engage_hri.services.perception.hearing.config import HearingConfig
 from engage_hri.services.perception.hearing.voice import Samples
 
 
@@ -32,6 +33,13 @@ class RecognizerSettings(Struct, frozen=True, kw_only=True):
     model: str = ""
     phrases: tuple[str, ...] = ()
     address: str = ""
+
+
+def settings_of(config: HearingConfig) -> RecognizerSettings:
+    """Pick the settings of the recognizer."""
+    return RecognizerSettings(
+        language=config.language, model=config.model, phrases=config.phrases, address=config.address
+    )
 
 
 class SpeechWords(Struct, frozen=True):
@@ -98,7 +106,7 @@ def no_model(reason: str, advice: str) -> InputRefused:
 # -- the desk ------------------------------------------------------------------------------------------------------
 
 
-class Sound(Struct, frozen=True, tag=True):
+class SpeechOrder(Struct, frozen=True, tag=True):
     """Order: more sound of a speech. speech: its number. samples: 16 bit, little-endian; empty: none any more."""
 
     speech: int
@@ -131,7 +139,7 @@ class Desk:
         self._speeches: dict[int, tuple[Listening | None, str]] = {}
         """By number: who hears it, None if it was given up, and the words that were told."""
 
-    def take(self, order: Sound) -> Iterator[Answer]:
+    def take(self, order: SpeechOrder) -> Iterator[Answer]:
         """Take an order, and answer if there is news. The last answer of a speech is final, or a failure."""
         try:
             listening, told = self._speeches.get(order.speech) or (self._recognizer.listen(), "")

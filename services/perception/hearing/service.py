@@ -33,7 +33,7 @@ from engage_hri.services.client.people.shared_world import SharedWorld
 from engage_hri.services.perception.hearing.config import HearingConfig
 from engage_hri.services.perception.hearing.listening import InItsOwn, InThisProcess, Order, Understanding
 from engage_hri.services.perception.hearing.microphone import SoundLost, is_file, pieces
-from engage_hri.services.perception.hearing.recognizing import Answer, KnownWords, RecognizerSettings, SpeechWords
+from engage_hri.services.perception.hearing.recognizing import Answer, KnownWords, SpeechWords, settings_of
 from engage_hri.services.perception.hearing.sound import Piece
 from engage_hri.services.perception.hearing.voice import (
     VoiceBegan,
@@ -115,13 +115,9 @@ class _Hearing:
     def _understanding(self) -> Understanding | None:
         if not self._config.recognizer:
             return None
-        config = self._config
-        settings = RecognizerSettings(
-            language=config.language, model=config.model, phrases=config.phrases, address=config.address
-        )
         is_real = abs(self._bus.now() - time.monotonic()) < 1.0
         kind = InItsOwn if is_real else InThisProcess
-        return kind(Order(config.recognizer, settings), self._answered)
+        return kind(Order(self._config.recognizer, settings_of(self._config)), self._answered)
 
     async def wait_for_recognition(self, inbox: Subscription) -> None:
         """Wait until recognition is there, and for the world. Then people come who have channels of their own."""
