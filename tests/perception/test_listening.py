@@ -155,9 +155,13 @@ async def test_a_program_that_records_gives_samples_until_it_ends_and_that_is_to
 
 
 async def test_a_program_that_gives_nothing_is_taken_for_dead(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(microphone, "STARTING", 0.7)
+    with pytest.raises(SoundLost, match=r"gives no sample for 0\.7 s"):
+        await anext(pieces(script(tmp_path, "time.sleep(99)"), 1))
+    monkeypatch.setattr(microphone, "STARTING", 20.0)
     monkeypatch.setattr(microphone, "SILENT", 0.5)
     with pytest.raises(SoundLost, match=r"gives no sample for 0\.5 s"):
-        await anext(pieces(script(tmp_path, "time.sleep(99)"), 1))
+        await all_of(pieces(script(tmp_path, "out.write(bytes(640))\nout.flush()\ntime.sleep(99)"), 1), [])
     with pytest.raises(SoundLost, match="does not start"):
         await anext(pieces((str(tmp_path / "nothing"),), 1))
 

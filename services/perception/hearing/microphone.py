@@ -27,6 +27,8 @@ PIECE: Seconds = 0.02
 """Length of the pieces in which a file is played."""
 SILENT: Seconds = 1.5
 """Time without any sample, not even of silence, after which a device is taken for dead."""
+STARTING: Seconds = 5.0
+"""Time until the first sample: devices have to wake up."""
 KEPT = 256
 """Pieces that wait at most while the loop is busy."""
 OURS = "engage_hri.services.perception.hearing.microphone"
@@ -89,7 +91,7 @@ async def recorded(program: tuple[str, ...], channels: int) -> AsyncGenerator[Pi
     loop = asyncio.get_running_loop()
     clock, frame, rest = SampleClock(), 2 * channels, b""
     arrived: deque[tuple[bytes, Seconds]] = deque(maxlen=KEPT)
-    news, end = asyncio.Event(), ""
+    news, end, patience = asyncio.Event(), "", STARTING
 
     def take(more: bytes) -> None:
         arrived.append((more, loop.time()))
@@ -111,11 +113,12 @@ async def recorded(program: tuple[str, ...], channels: int) -> AsyncGenerator[Pi
     try:
         while True:
             try:
-                async with asyncio.timeout(SILENT):
+                async with asyncio.timeout(patience):
                     await news.wait()
             except TimeoutError:
-                raise lost(f"gives no sample for {SILENT:g} s") from None
+                raise lost(f"gives no sample for {patience:g} s") from None
             news.clear()
+            patience = SILENT
             while arrived:
                 more, at = arrived.popleft()
                 content = rest + more
