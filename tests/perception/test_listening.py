@@ -43,6 +43,8 @@ class OddListening(Listening):
     def hear(self, samples):
         if len(samples) == 7:
             os._exit(3)
+        if len(samples) == 9:
+            raise ValueError("nine")
         if len(samples) == 8:
             time.sleep(99)
         return str(len(samples))
@@ -99,6 +101,19 @@ async def test_a_recognizer_that_dies_costs_one_speech(odd: Callable[..., VoiceE
     assert isinstance(failed, NotUnderstood)
     assert failed.fault.reason == "the recognizer odd has ended with code 3: engines print"
     assert (await ear.said(2, 10))[-1] == KnownWords(2, SpeechWords("over"), True)
+    ear.work.close()
+
+
+async def test_a_speech_at_which_it_fails_is_given_up_and_its_process_goes_on(odd: Callable[..., VoiceEar]):
+    ear = odd()
+    await ear.work.made()
+
+    ear.work.hear(1, bytes(18))
+    await ear.last.wait()
+    assert len(await ear.said(2, 10)) == 2
+    ear.work.hear(1, bytes(20))
+    ear.work.hear(1, b"")
+    assert [each.speech for each in await ear.said(3, 10)] == [3, 3]
     ear.work.close()
 
 

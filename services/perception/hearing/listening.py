@@ -181,8 +181,9 @@ class InItsOwn(Understanding):
             timer = self._open.pop(answer.speech, None)
             if timer is not None:
                 timer.cancel()
-            elif isinstance(answer, NotUnderstood):
+            elif isinstance(answer, NotUnderstood) and self._child is not None:  # given up while it went on
                 self._failed.append(answer.speech)
+                self._child.write(_packed(SpeechOrder(answer.speech, b"")))
         self._on_answer(answer)
 
     def _lose(self, how: str, fault: Fault | None = None) -> None:
