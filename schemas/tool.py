@@ -149,7 +149,7 @@ class ToolInput(Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_un
     within: Annotated[
         Literal[0, 3, 6, 10, 20, 30, 60],
         Meta(
-            description="Seconds that the person has to answer, if not as usual (4.5 for a reply, 8 for an action): "
+            description="Seconds that the person has to answer, if not as usual (6 for a reply, 8 for an action): "
             "6 for a question to think about. 0, or left out: as usual."
         ),
     ] = 0

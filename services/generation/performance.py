@@ -103,7 +103,7 @@ class FragmentPerformance:
         self._gaze = ""
         """The behavior that holds the head."""
         self._asked: dict[str, str] = {}
-        """Ids of the events that the outcome waits for, each with the session of recognition that was asked for it."""
+        """Ids of the events that the outcome waits for, each with the session of recognition that was asked."""
         self._closed: set[str] = set()
         """Ids of the behaviors and events that the realizer has ended."""
         self._forbidden: set[str] = set()
@@ -132,7 +132,7 @@ class FragmentPerformance:
         return new
 
     def feed(self, progress: SyncPointProgress, session: str) -> None:
-        """Take a sync point of this fragment's block. session: of recognition's present life; empty: none is there."""
+        """Take a sync point of this fragment's block. session: of recognition now; empty: none is there."""
         behavior = self._behaviors.get(progress.behavior)
         if behavior is None:
             return

@@ -42,6 +42,10 @@ who thinks looks at nobody, and answers who has asked
     1 robot asks ann 2; 3.6 ann speaks 1; 20 end
     robot: started 1, succeeded 3.6 after 0.6, completed 4.6
 
+... however long that takes, while the robot waits
+    1 robot asks ann 2 limit=20; 12 ann speaks 1; 30 end
+    robot: started 1, succeeded 12 after 9, completed 13
+
 an answer to another is none
     1 robot asks ann 2; 2 ann looks bob; 3.6 ann speaks 1; 20 end
     robot: started 1, failed 7
@@ -207,8 +211,9 @@ def _spelled_out(log: Log, steps: list[str]) -> Iterable[tuple[float, int, Any]]
                 end, block, cut = at + float(lasts), f"block-{number}", "cut" in named
                 for one in person.split(","):
                     asked = request_event(
-                        "adjacency_pair", at, request=f"{block}/{one}", block=block, turn=block, responder=one
-                    )
+                        "adjacency_pair", at, request=f"{block}/{one}", block=block, turn=block, responder=one,
+                        limit=float(named["limit"]) if "limit" in named else None,
+                    )  # fmt: skip
                     yield at, number, lambda at=at, asked=asked: log.feed(asked, at)
                 yield at, number, lambda at=at, b=block: log.begins(ROBOT, "speak", at, behavior=f"{b}:s")
                 yield end, number, lambda end=end, b=block: log.ends(ROBOT, "speak", end, behavior=f"{b}:s")

@@ -310,7 +310,10 @@ class Talk(KindRecognizer):
         if speech.until is None:
             speech.faces.turns(speech.faces.face, at)
         is_noise = self._scene.tells_addressees and not says_words(speech.words)
-        self._address(speech, likely(speech, self._scene.spoken, is_noise=is_noise), at)
+        waits = self._conversation.pair.may_be_answered_with("speak")
+        awaited_by = frozenset((self._scene.robot,)) if waits else NOBODY
+        to = likely(speech, self._scene.spoken, awaited_by=awaited_by, is_noise=is_noise)
+        self._address(speech, to, at)
 
     def may_go_on(self, now: Seconds) -> bool:
         """True if it is decided by `now` to whom the first speech in line is, or if what is decided may be told."""
