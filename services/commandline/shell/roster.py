@@ -23,7 +23,9 @@ TASK = "collaboration"
 """Service that ends by itself, with the task."""
 SENSES = ("hearing",)
 """Services that find out what people do from sensors; a robot may do without."""
-NAMES = ("generation", "realizer", "recognition", "control", *SENSES, *ELSEWHERE)
+PLAY = (*ROBOT, *ELSEWHERE)
+"""A robot with simulated people and their task: nothing of it needs a device."""
+NAMES = (*ROBOT, *SENSES, *ELSEWHERE)
 FUNCTIONS = {"generation": "generate", "realizer": "realize", "recognition": "recognize", "control": "embody"}
 """Coroutine function in the `service.py` of each service of a robot."""
 
