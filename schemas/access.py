@@ -251,7 +251,12 @@ TABLE: tuple[Row, ...] = (
 
 ROLES = tuple(dict.fromkeys(row.role for row in TABLE))
 """Roles that a holder may have, without `ROUTER`."""
-PARTICIPANTS = {**{name: name for name in keys.SERVICES}, "simulation": "perception", "collaboration": "manager"}
+PARTICIPANTS = {
+    **{name: name for name in keys.SERVICES},
+    "simulation": "perception",
+    "hearing": "perception",
+    "collaboration": "manager",
+}
 """Roles of the services that have another name."""
 
 
