@@ -30,6 +30,7 @@ from engage_hri.services.console.web.guard import App, Guarded, Hosts
 from engage_hri.services.console.web.played import PlayedPicture
 from engage_hri.services.console.web.service import WindowServer
 from engage_hri.services.console.web.sessions import CLOSED, PageSession, Sessions
+from engage_hri.services.console.web.sounds import Sounds
 from engage_hri.services.console.web.visitor import Visitor
 from engage_hri.services.recording.reading import Recording
 
@@ -105,7 +106,16 @@ def application(window: WindowServer, hosts: Hosts, token: str, pages: Path | No
             with contextlib.suppress(WebSocketDisconnect):
                 await _tell(window, program, Outbox(only))
 
-    more: list[BaseRoute] = [WebSocketRoute(MESSAGES, messages)]
+    def visitor(session: str) -> Visitor | None:
+        guest = sessions.guest(session)
+        return guest if isinstance(guest, Visitor) else None
+
+    sounds = Sounds(window.bus, visitor)
+    more: list[BaseRoute] = [
+        WebSocketRoute(MESSAGES, messages),
+        WebSocketRoute("/voice", sounds.voice),
+        WebSocketRoute("/microphone", sounds.microphone),
+    ]
     if pages is not None:
         more.append(Mount(PAGES, StaticFiles(directory=pages, html=True)))
     return Guarded(_app(window.bus.robot, frames, sessions.close, more, enter), hosts, {MESSAGES})
