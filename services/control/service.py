@@ -30,7 +30,7 @@ from engage_hri.services.control.contract.body import (
     DriverBroken,
     MovementAuthority,
     Spoke,
-    VoiceSound,
+    SpokenSound,
 )
 from engage_hri.services.control.contract.calibration import calibrated
 from engage_hri.services.control.contract.refusals import VOICE_ADVICE
@@ -240,7 +240,7 @@ class _Control:
         """Tell whoever sees the log that something is over of which it was warned."""
         journal.alert(self._bus.log, "control: %s", text)
 
-    def _tell_sound(self, sound: VoiceSound) -> None:
+    def _tell_sound(self, sound: SpokenSound) -> None:
         """Tell whoever listens what the voice is about to be heard of."""
         at = self._bus.stamp(sound.at)
         frame = SoundFrame(at=at, rate=sound.rate, samples=sound.samples, number=next(self._sounds))

@@ -16,7 +16,7 @@ from engage_hri.schemas.sound import SoundFrame
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.bases.composed import Member, composed
 from engage_hri.services.control.bases.driver_guard import GuardedBody
-from engage_hri.services.control.contract.body import MovementAuthority, Spoke, VoiceSound
+from engage_hri.services.control.contract.body import MovementAuthority, Spoke, SpokenSound
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.voice.outlets import AHEAD, PIECE
 from engage_hri.services.control.voice.sounding import SoundingVoice
@@ -37,7 +37,7 @@ class Listener:
 
     def __init__(self, body: SoundingVoice | GuardedBody, *, is_there: bool = True) -> None:
         self.is_there = is_there
-        self.told: list[tuple[float, VoiceSound]] = []
+        self.told: list[tuple[float, SpokenSound]] = []
         self._now = asyncio.get_running_loop().time
         body.on_sound = lambda sound: self.told.append((self._now(), sound))
         body.wants_sound = lambda: self.is_there

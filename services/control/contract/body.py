@@ -264,7 +264,7 @@ class MouthShape(Struct, frozen=True):
     width: float = 0.0
 
 
-class VoiceSound(Struct, frozen=True):
+class SpokenSound(Struct, frozen=True):
     """A piece of what a voice says: 16 bit, little-endian, one channel.
 
     at: loop time at which the first sample is heard, seconds. rate: samples per second. samples: empty: nothing of
@@ -321,7 +321,7 @@ class Body(ABC):
     on_fault: Callable[[Fault], None] = staticmethod(lambda fault: None)
     on_recovery: Callable[[str], None] = staticmethod(lambda text: None)
     on_lips: Callable[[Sequence[MouthShape]], None] = staticmethod(lambda shapes: None)
-    on_sound: Callable[[VoiceSound], None] = staticmethod(lambda sound: None)
+    on_sound: Callable[[SpokenSound], None] = staticmethod(lambda sound: None)
     wants_sound: Callable[[], bool] = staticmethod(lambda: False)
 
     @classmethod

@@ -7,7 +7,7 @@ from typing import BinaryIO
 
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.contract.body import VoiceSound
+from engage_hri.services.control.contract.body import SpokenSound
 
 STUCK: Seconds = 0.8
 """So long an outlet may take nothing while it is late, before it counts as dead."""
@@ -177,7 +177,7 @@ class ToldSound(Outlet):
         self,
         now: Callable[[], Seconds],
         rate: int,
-        tell: Callable[[VoiceSound], None],
+        tell: Callable[[SpokenSound], None],
         is_wanted: Callable[[], bool],
     ) -> None:
         """rate: samples per second. tell: gets the sound, and where it is cut. is_wanted: whether anybody plays."""
@@ -202,13 +202,13 @@ class ToldSound(Outlet):
             return
         size = 2 * round(PIECE * self._rate)
         for begin in range(0, len(samples), size):
-            self._tell(VoiceSound(at + begin / 2 / self._rate, self._rate, samples[begin : begin + size]))
+            self._tell(SpokenSound(at + begin / 2 / self._rate, self._rate, samples[begin : begin + size]))
         self._silent_from = max(self._silent_from, at + len(samples) / 2 / self._rate)
 
     def announce_cut(self, at: Seconds) -> None:
         if at < self._silent_from:
             self._silent_from = at
-            self._tell(VoiceSound(at, self._rate))
+            self._tell(SpokenSound(at, self._rate))
 
     def cut(self, at: Seconds, tail: bytes) -> None:
         self.announce_cut(at)
