@@ -171,7 +171,12 @@ async def test_each_word_sounds_in_the_page_when_it_is_told(place: Place) -> Non
     truth = in_file(place.file)
     found = [beside(truth, heard, word.at) for word in listener.words]
 
-    print([(word.text, round(1000 * late), round(alike, 2)) for word, (late, alike) in zip(listener.words, found, strict=True)])
+    print(
+        [
+            (word.text, round(1000 * late), round(alike, 2))
+            for word, (late, alike) in zip(listener.words, found, strict=True)
+        ]
+    )
     assert [word.text for word in listener.words] == 2 * TEXT.split()
     assert truth.rate == heard.rate
     assert max(abs(late) for late, _ in found) < 0.1
