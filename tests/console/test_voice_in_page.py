@@ -118,6 +118,7 @@ async def listening(place: Place) -> AsyncIterator[Listener]:
         Robot.on(hub.join("director")) as robot,
     ):
         await tap(page)
+        await page.look(400, 300)  # without a graphics card a large scene holds the page up
         await page.go(place.url)
         await page.until("window.engage?.state.you && window.engage.state.health", 60)
         await press(page, "#voice")

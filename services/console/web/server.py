@@ -82,7 +82,9 @@ def application(window: WindowServer, hosts: Hosts, token: str, pages: Path | No
             return None
         response = RedirectResponse("./", 303)
         if is_token(given):
-            response.set_cookie(cookie, token, path=None, httponly=True, samesite="strict")  # path: that of the page
+            safe = request.url.scheme == "https"
+            # path: that of the page
+            response.set_cookie(cookie, token, path=None, httponly=True, samesite="strict", secure=safe)
         return response
 
     sessions = Sessions(lambda receipts, trusted: Visitor(window, trusted, receipts), MOST_VIEWERS)
@@ -321,15 +323,17 @@ class _Quiet(uvicorn.Server):
 
 
 @contextlib.asynccontextmanager
-async def serving(app: App, host: str, port: int) -> AsyncIterator[int]:
+async def serving(app: App, host: str, port: int, keys: tuple[Path, Path] | None = None) -> AsyncIterator[int]:
     """Serve while the body of `async with` runs. port: 0: any that is free. Returns the port.
 
-    Raises OSError if the port is taken.
+    keys: files of a certificate and of its private key, to speak TLS. Raises OSError if the port is taken.
     """
+    certificate, private = keys or (None, None)
     # With a configuration of its own for the log, it would close the handlers of ours.
     config = uvicorn.Config(
         app, log_config=None, log_level="warning", access_log=False, lifespan="on", timeout_graceful_shutdown=1,
         ws="websockets-sansio", ws_per_message_deflate=False, ws_max_size=LARGEST_ORDER,
+        ssl_certfile=certificate, ssl_keyfile=private,
     )  # fmt: skip
     listening = _bound(host, port)
     server = _Quiet(config)

@@ -161,7 +161,7 @@ class Several(Outlet):
         return ends.close
 
 
-AHEAD: Seconds = 0.15
+AHEAD: Seconds = 0.2
 """How long before it is heard sound is told that others play: for its way to them, and a loop that is late."""
 PIECE: Seconds = 0.1
 """Seconds of sound in what is told at a time."""

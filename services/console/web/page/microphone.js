@@ -21,7 +21,7 @@ const REFUSED = {
 function lacking() {
   if (navigator.mediaDevices?.getUserMedia && window.AudioWorkletNode) return "";
   if (isSecureContext) return "this browser gives no page a microphone";
-  return "browsers give one only to https and to localhost, and this page came by http: start the window with `--https`, and open the address that it prints";
+  return "browsers give one only to https and to localhost, and this page came by http: start the window with --https FILE, and open the address that it prints";
 }
 
 export function microphone(panel, session) {
@@ -141,7 +141,7 @@ export function microphone(panel, session) {
   button.addEventListener("click", () => {
     if (on) return off();
     const reason = lacking();
-    if (reason) return tell(`There is no microphone: ${reason.replaceAll("`", "")}.`);
+    if (reason) return tell(`There is no microphone: ${reason}.`);
     begin();
   });
   show();

@@ -5,6 +5,7 @@ import { timed } from "./timed.js";
 const HEADER = 16; // bytes: the instant, the number of the frame, and the samples per second
 const JOINS = 0.003; // seconds by which what follows may be beside what was before: then it follows without a gap
 const SPEECH = 0.5; // seconds after which the clocks are compared anew; within them what follows keeps its distance
+const LAG = 0.08; // seconds by which a speech may be late as a whole, so that what comes too late is still heard
 const FADE = 0.004; // seconds in which sound ends that is cut
 const AGAIN = 1000; // ms from a broken link to the next try
 
@@ -12,6 +13,7 @@ const AGAIN = 1000; // ms from a broken link to the next try
 export function speaker(link, late) {
   let context = null;
   let last = null; // where the sound ends that came last: in the window's clock, and in the context's
+  let lag = 0; // seconds by which what plays is late
   let playing = [];
   const open = (rate) => {
     if (context?.sampleRate === rate) return;
@@ -30,16 +32,21 @@ export function speaker(link, late) {
   const next = (at) => {
     const apart = last === null ? Infinity : at - last.at;
     if (Math.abs(apart) < JOINS) return last.time;
-    return apart > 0 && apart < SPEECH ? last.time + apart : place(at);
+    const caught = Math.min(lag, apart); // silence makes good what is late
+    lag = apart > 0 && apart < SPEECH ? lag - caught : 0;
+    return apart > 0 && apart < SPEECH ? last.time + apart - caught : place(at);
   };
 
   function play(at, rate, samples) {
     open(rate);
     const seconds = samples.length / rate;
-    const begin = next(at);
+    let begin = next(at);
+    const more = Math.max(0, Math.min(context.currentTime - begin, LAG - lag));
+    lag += more;
+    begin += more;
     last = { at: at + seconds, time: begin + seconds };
     const passed = Math.max(0, context.currentTime - begin);
-    if (passed > 0) late(passed);
+    if (passed > 0) late(Math.min(passed, seconds));
     if (passed >= seconds) return;
     const buffer = context.createBuffer(1, samples.length, rate);
     const floats = buffer.getChannelData(0);
