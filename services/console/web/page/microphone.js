@@ -78,7 +78,8 @@ export function microphone(panel, session) {
     tell("");
     own.heard = performance.now();
     own.timer = setInterval(() => look(own, track), LOOK);
-    own.link = timed(`microphone?session=${encodeURIComponent(session())}`, {
+    const address = new URL(`microphone?session=${encodeURIComponent(session())}`, document.baseURI);
+    own.link = timed(address, {
       ended: (reason) => on === own && off(`The microphone is off: ${reason || "the link to the window is broken"}.`),
     });
     own.context = context(own.stream);

@@ -3,9 +3,9 @@ const ASKED = [0, 50, 100, 200, 400, 800]; // ms after the link is open at which
 const EVERY = 500; // ms between two questions after that
 const KEPT = 40; // answers of which the quickest counts: 20 s
 
-// path: of the WebSocket. heard: gets what comes in bytes. ended: gets why it has closed, in words; empty: unknown.
-export function timed(path, { ready = () => {}, heard = () => {}, ended }) {
-  const place = new URL(path, document.baseURI);
+// address: of the WebSocket, as of a page. heard: gets what comes in bytes. ended: gets why it has closed, in words; empty: unknown.
+export function timed(address, { ready = () => {}, heard = () => {}, ended }) {
+  const place = new URL(address);
   place.protocol = place.protocol.replace("http", "ws");
   const socket = new WebSocket(place);
   socket.binaryType = "arraybuffer";
