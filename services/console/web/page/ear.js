@@ -27,7 +27,7 @@ class Ear extends AudioWorkletProcessor {
       this.sum = this.count = 0;
       this.filled += 1;
       if (this.filled < WINDOW) continue;
-      this.port.postMessage({ frame: this.began, samples: this.window.slice(0) });
+      this.port.postMessage({ frame: this.began, samples: this.window.slice(0), ended: Date.now() }); // the only clock that there is here
       this.filled = 0;
     }
     return true;

@@ -7,7 +7,7 @@ const HEADER = 12; // bytes: the instant, and the number of the frame
 const FULL = RATE * 2; // bytes that may wait for the link: a second of sound; what comes then is lost
 const SILENT = 1500; // ms without any sound from the microphone, or any word from the window, after which something is wrong
 const LOOK = 250; // ms between two looks at how it goes
-const LAG = 200; // windows of sound, 6 s, of which the one that came quickest says how the clocks of context and page stand
+const LAG = 8; // windows of sound, a quarter of a second, of which the one that came quickest says how the clocks of context and page stand
 
 const GONE = "The microphone is off: it was unplugged, or taken away.";
 const REFUSED = {
@@ -92,7 +92,7 @@ export function microphone(panel, session) {
   }
   // Of our rate if the browser has the sound so; else the ear takes the mean of what it gets.
   function context(stream) {
-    const made = new AudioContext({ sampleRate: RATE });
+    const made = new AudioContext({ sampleRate: RATE, sinkId: { type: "none" } }); // it plays nothing: no device is to hold it up
     try {
       new MediaStreamAudioSourceNode(made, { mediaStream: stream }).disconnect();
       return made;
@@ -102,13 +102,12 @@ export function microphone(panel, session) {
     }
   }
 
-  function send(own, track, { frame, samples }) {
+  function send(own, track, { frame, samples, ended }) {
     const { lags } = own;
     const here = performance.now();
     own.isSound ||= samples.some(Boolean); // one that is muted gives nothing but zeros
     if (own.isSound) own.heard = here;
-    const ended = (1000 * frame) / own.context.sampleRate + (1000 * samples.length) / RATE;
-    lags.push(here - ended);
+    lags.push(ended - (Date.now() - here) - (1000 * frame) / own.context.sampleRate - (1000 * samples.length) / RATE);
     if (lags.length > LAG) lags.shift();
     const latency = 1000 * (track.getSettings().latency ?? 0);
     const at = own.link.there((1000 * frame) / own.context.sampleRate + Math.min(...lags) - latency);

@@ -1,8 +1,8 @@
 // Plays the pieces of a voice off the main thread, so that a page that draws holds no word up.
 const JOINS = 0.003; // seconds by which what follows may be beside what was before: then it follows without a gap
 const SPEECH = 0.5; // seconds after which the clocks are compared anew; within them what follows keeps its distance
-const LAG = 0.08; // seconds by which a speech may be late as a whole, so that what comes too late is still heard
-const APART = 0.1; // seconds by which it may be beside the clocks: a device that stood still for a while is late from then on
+const LAG = 0.05; // seconds by which a speech may be late as a whole, so that what comes too late is still heard
+const APART = 0.06; // seconds by which it may be beside the clocks: a device that stood still for a while is late from then on
 const FADE = 0.004; // seconds in which sound ends that is cut
 
 class Speech extends AudioWorkletProcessor {
