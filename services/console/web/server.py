@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import json
 import re
 import secrets
 import socket
@@ -21,6 +22,7 @@ from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from engage_hri.schemas.behaviors import EVENT_KINDS
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
@@ -133,6 +135,13 @@ def recorded(recording: Recording, hosts: Hosts) -> App:
     return Guarded(_app(recording.robot, frames, sessions.close), hosts)
 
 
+def page_of(robot: str) -> str:
+    """The page of a robot, which knows the kinds of connection events."""
+    kinds = [(kind, each.short or each.title, each.is_answered) for kind, each in EVENT_KINDS.items()]
+    page = (PAGE / "index.html").read_text(encoding="utf-8").replace("{kinds}", escape(json.dumps(kinds)))
+    return page.replace("{robot}", escape(robot))
+
+
 def _app(
     robot: str,
     frames: Callable[[WebSocket], Awaitable[None]],
@@ -141,8 +150,7 @@ def _app(
     enter: Callable[[Request], Response | None] = lambda request: None,
 ) -> Starlette:
     """The page and its frames. close: is called at the end. enter: may answer in place of the page."""
-    page = (PAGE / "index.html").read_text(encoding="utf-8").replace("{robot}", escape(robot))
-
+    page = page_of(robot)
     imports = re.search("<script type=.importmap.>(.*?)</script>", page)
     assert imports is not None
     digest = b64encode(sha256(imports[1].encode()).digest()).decode()
