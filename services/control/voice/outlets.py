@@ -161,8 +161,10 @@ class Several(Outlet):
         return ends.close
 
 
-AHEAD: Seconds = 0.2
+AHEAD: Seconds = 0.15
 """How long before it is heard sound is told that others play: for its way to them, and a loop that is late."""
+SOON: Seconds = 0.06
+"""The same where a speech begins or goes on: gestures that begin with it do not wait for it."""
 PIECE: Seconds = 0.1
 """Seconds of sound in what is told at a time."""
 
@@ -192,7 +194,7 @@ class ToldSound(Outlet):
         return self._lead
 
     def earliest(self) -> Seconds:
-        return self.now() + self._lead
+        return self.now() + min(SOON, self._lead)
 
     def revive(self) -> None:
         self._lead = AHEAD if self._is_wanted() else 0.0
