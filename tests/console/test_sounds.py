@@ -11,8 +11,6 @@ import pytest
 
 pytest.importorskip("starlette", reason="needs the extra `console`")
 
-from starlette.websockets import WebSocket
-
 from engage_hri.schemas import keys
 from engage_hri.schemas.sound import SoundFrame
 from engage_hri.services.bus.interface import Bus
@@ -32,7 +30,7 @@ class FakePage:
         self._says: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
         self.say({"type": "websocket.connect"})
         scope = {"type": "websocket", "path": "/", "query_string": query.encode(), "headers": []}
-        self.link = WebSocket(scope, self._says.get, self._take)
+        self.link = sounds.WebSocket(scope, self._says.get, self._take)
 
     async def _take(self, message: Any) -> None:
         if message["type"] == "websocket.close":

@@ -89,7 +89,8 @@ class Listener:
                 await self.told.wait()
 
     async def heard(self) -> "Recorded":
-        await asyncio.sleep(0.5)
+        """What the page has played, and plays for three seconds more."""
+        await self.page.until(f"tapped.blocks.at(-1)[0] > {await self.page.value('tapped.blocks.at(-1)[0]')} + 66150")
         begin, samples, rate = await tapped(self.page, time.monotonic())
         return Recorded(begin, samples.astype(float), rate)
 
@@ -123,7 +124,7 @@ async def listening(place: Place) -> AsyncIterator[Listener]:
         await page.until("window.engage?.state.you && window.engage.state.health", 60)
         await press(page, "#voice")
         await page.until("document.querySelector('#voice').getAttribute('aria-pressed') === 'true'")
-        await asyncio.sleep(1.5)  # it has asked for the window's time
+        await page.until("tapped.marks.length > 25")  # a second, in which it asks for the window's time
         bus, listener = hub.join("listener", "observer"), Listener(page, robot)
         with bus.subscribe(keys.SYNC_POINT) as inbox:
 
