@@ -35,6 +35,7 @@ SHELLS = {
     "services/console/follow.py",  # subscribes
     "services/console/terminal/live.py",  # draws
     "services/console/web/server.py",  # serves the page
+    "services/console/web/sounds.py",  # sound to the page, and from it
     "services/console/web/visitor.py",  # carries out orders
 }
 """Files beside `service.py` that are not pure. Each is a decision: keep the list short."""

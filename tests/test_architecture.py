@@ -78,7 +78,7 @@ THREADS = {"threading", "_thread", "concurrent", "multiprocessing"}
 THREAD_CALLS = {"to_thread", "run_in_executor", "Thread", "ThreadPoolExecutor"}
 
 WEB = {"starlette", "uvicorn"}
-WITH_WEB = {"services/console/web/server.py"}
+WITH_WEB = {"services/console/web/server.py", "services/console/web/sounds.py"}
 """The only file with a web stack. It is the exception to "no threads": it reads the files of the page on worker
 threads, which touch nothing of ours; pages, frames and orders stay on the one loop."""
 

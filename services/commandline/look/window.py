@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Hub
+from engage_hri.services.commandline.look.https import server_keys
 from engage_hri.services.commandline.shell.failing_output import complain
 from engage_hri.services.commandline.shell.options import Shown
 from engage_hri.services.commandline.shell.process import unique_name
@@ -51,27 +52,34 @@ def web() -> ModuleType:
     return server
 
 
+def names(shown: Shown) -> tuple[str, ...]:
+    """Names by which the page may be called."""
+    own = gethostname()
+    more = () if shown.host in LOCAL else (shown.host, own, f"{own}.local")
+    return (*LOCAL, *more, *(shown.called or ()))
+
+
 def hosts(shown: Shown) -> "Hosts":
-    """Names by which the page may be called: else a page of others could call it by a name of theirs."""
+    """All that the page may be called: else a page of others could call it by a name of theirs."""
     from engage_hri.services.console.web.guard import Hosts
 
-    if shown.host in LOCAL:
-        return Hosts((*LOCAL, *(shown.called or ())))
-    own = gethostname()
-    return Hosts((*LOCAL, shown.host, own, f"{own}.local", *(shown.called or ())), addresses=True)
+    return Hosts(names(shown), addresses=shown.host not in LOCAL)
 
 
 @asynccontextmanager
 async def served(
     app: Any, shown: Shown, token: str, tell: Callable[[str], None], *, role: str, port: int = 0, opens: bool = True
 ) -> AsyncIterator[None]:
-    """Serve a page while the body of `async with` runs. Raises RunFailed if the port is taken.
+    """Serve a page while the body of `async with` runs.
+
+    Raises RunFailed if the port is taken, and InputRefused if there is no certificate where `--https` says.
 
     tell: gets its address. role: of whoever has the token. port: 0: any that is free. opens: show it in the browser.
     """
+    keys = server_keys(shown.https, names(shown)) if shown.https else None
     async with AsyncExitStack() as stack:
         try:
-            port = await stack.enter_async_context(web().serving(app, shown.host, port))
+            port = await stack.enter_async_context(web().serving(app, shown.host, port, keys))
         except OSError as error:
             is_taken = error.errno == errno.EADDRINUSE
             free = "is another window there? --port 0 takes any that is free"
@@ -79,10 +87,13 @@ async def served(
             reason = os.strerror(error.errno) if error.errno else str(error)
             raise RunFailed(Fault(reason=reason, where=f"{shown.host}:{port}", advice=advice)) from error
         host = "127.0.0.1" if shown.host in ("0.0.0.0", "::") else shown.host
-        url = f"http://{f'[{host}]' if ':' in host else host}:{port}/" + (f"?token={token}" if token else "")
+        url = f"http{'s' if keys else ''}://{f'[{host}]' if ':' in host else host}:{port}/" + (
+            f"?token={token}" if token else ""
+        )
         tell(url)
         if shown.host not in LOCAL:
-            seen = f"everybody who reaches {shown.host} sees all of this robot, and the people before it, unencrypted"
+            seen = f"everybody who reaches {shown.host} sees all of this robot, and the people before it"
+            seen += "" if keys else ", unencrypted"
             more = f"; who has the token in the address above takes part as {role}"
             complain(seen if role == "observer" else seen + more)
         if opens:

@@ -32,6 +32,7 @@ from engage_hri.services.console.web.guard import App, Guarded, Hosts
 from engage_hri.services.console.web.played import PlayedPicture
 from engage_hri.services.console.web.service import WindowServer
 from engage_hri.services.console.web.sessions import CLOSED, PageSession, Sessions
+from engage_hri.services.console.web.sounds import Sounds
 from engage_hri.services.console.web.visitor import Visitor
 from engage_hri.services.recording.reading import Recording
 
@@ -83,7 +84,9 @@ def application(window: WindowServer, hosts: Hosts, token: str, pages: Path | No
             return None
         response = RedirectResponse("./", 303)
         if is_token(given):
-            response.set_cookie(cookie, token, path=None, httponly=True, samesite="strict")  # path: that of the page
+            safe = request.url.scheme == "https"
+            # path: that of the page
+            response.set_cookie(cookie, token, path=None, httponly=True, samesite="strict", secure=safe)
         return response
 
     sessions = Sessions(lambda receipts, trusted: Visitor(window, trusted, receipts), MOST_VIEWERS)
@@ -107,7 +110,16 @@ def application(window: WindowServer, hosts: Hosts, token: str, pages: Path | No
             with contextlib.suppress(WebSocketDisconnect):
                 await _tell(window, program, Outbox(only))
 
-    more: list[BaseRoute] = [WebSocketRoute(MESSAGES, messages)]
+    def visitor(session: str) -> Visitor | None:
+        guest = sessions.guest(session)
+        return guest if isinstance(guest, Visitor) else None
+
+    sounds = Sounds(window.bus, visitor)
+    more: list[BaseRoute] = [
+        WebSocketRoute(MESSAGES, messages),
+        WebSocketRoute("/voice", sounds.voice),
+        WebSocketRoute("/microphone", sounds.microphone),
+    ]
     if pages is not None:
         more.append(Mount(PAGES, StaticFiles(directory=pages, html=True)))
     return Guarded(_app(window.bus.robot, frames, sessions.close, more, enter), hosts, {MESSAGES})
@@ -319,15 +331,17 @@ class _Quiet(uvicorn.Server):
 
 
 @contextlib.asynccontextmanager
-async def serving(app: App, host: str, port: int) -> AsyncIterator[int]:
+async def serving(app: App, host: str, port: int, keys: tuple[Path, Path] | None = None) -> AsyncIterator[int]:
     """Serve while the body of `async with` runs. port: 0: any that is free. Returns the port.
 
-    Raises OSError if the port is taken.
+    keys: files of a certificate and of its private key, to speak TLS. Raises OSError if the port is taken.
     """
+    certificate, private = keys or (None, None)
     # With a configuration of its own for the log, it would close the handlers of ours.
     config = uvicorn.Config(
         app, log_config=None, log_level="warning", access_log=False, lifespan="on", timeout_graceful_shutdown=1,
         ws="websockets-sansio", ws_per_message_deflate=False, ws_max_size=LARGEST_ORDER,
+        ssl_certfile=certificate, ssl_keyfile=private,
     )  # fmt: skip
     listening = _bound(host, port)
     server = _Quiet(config)

@@ -48,11 +48,16 @@ class Visitor:
         self._acting: asyncio.Task[None] | None = None
 
     @property
+    def person(self) -> str:
+        """Id of the person that they are; empty: none."""
+        return self._person.id if self._person else ""
+
+    @property
     def you(self) -> You:
         body = self._window.picture.body
         invited = Invitation("", "") if self._person else self._window.invitation
         return You(
-            person=self._person.id if self._person else "",
+            person=self.person,
             there=invited.there,
             sit=invited.button,
             denied=self._denied,

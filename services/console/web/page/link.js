@@ -80,6 +80,9 @@ export function follow({ take, tell, report, wait }) {
   });
   open();
   return {
+    get session() {
+      return orders.session;
+    },
     send(order) {
       say(orders.give(order, clock()));
       flush();
