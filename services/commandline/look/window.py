@@ -22,6 +22,7 @@ from engage_hri.services.runtime.installation import extra_command
 
 if TYPE_CHECKING:
     from engage_hri.services.console.web.guard import Hosts
+    from engage_hri.services.console.web.service import WindowServer
 
 NEEDED = ("starlette", "uvicorn", "nicegui")
 """Packages without which there is no window."""
@@ -100,10 +101,13 @@ async def served(
 
 
 @asynccontextmanager
-async def windowed(hub: Hub, shown: Shown, began: Seconds, tell: Callable[[str], None]) -> AsyncIterator[None]:
+async def windowed(
+    hub: Hub, shown: Shown, began: Seconds, tell: Callable[[str], None], *, kiosk: bool = False
+) -> AsyncIterator["WindowServer"]:
     """Show all that goes on at this hub in the browser, while the body of `async with` runs.
 
-    began: the instant from which the page counts its seconds. tell: gets the address of the window.
+    began: the instant from which the page counts its seconds. tell: gets the addresses of stage and workshop.
+    kiosk: the stage begins anew when its visitor has gone.
     """
     server = web()
     from engage_hri.services.console.web.orders import Script
@@ -113,9 +117,11 @@ async def windowed(hub: Hub, shown: Shown, began: Seconds, tell: Callable[[str],
     async with window(hub, bus, Script(()), began=began) as following:
         bus.declare_alive()
         app = server.application(following, hosts(shown), token)
-        pages = {stage_page(token): "the stage: ", workshop_page(token): "the workshop: "}
-        async with served(app, shown, pages, tell, role=bus.role):
-            yield
+        stage = stage_page(token) + ("&kiosk" if kiosk else "")
+        async with served(
+            app, shown, {stage: "the stage: ", workshop_page(token): "the workshop: "}, tell, role=bus.role
+        ):
+            yield following
 
 
 def workshop_page(token: str) -> str:

@@ -43,8 +43,9 @@ export function heads(place) {
       for (const turn of talk.bubbles) latest.set(turn.actor, turn);
       for (const [actor, turn] of latest) {
         const known = bubbles.get(actor) ?? bubble(actor, actor === scene.robot, actor === you);
-        if (known.since === null && !turn.open && now - turn.since > STAYS) known.over = -Infinity; // from before this page looked
+        const isOld = known.since === null && !turn.open && now - turn.since > STAYS; // from before this page looked
         say(known, turn, now);
+        if (isOld) known.over = -Infinity;
       }
       const anchors = new Map();
       if (scene.body?.eyes) anchors.set(scene.robot, scene.body.eyes);
@@ -69,7 +70,8 @@ export function heads(place) {
         const far = Math.max(24, (middle.y - head.y) * 1.1) + GAP; // from the middle of the head to the bubble
         const fits = { right: middle.x + far + width < box.width - GAP, left: middle.x - far - width > GAP };
         const order = actor === scene.robot ? ["right", "left"] : ["left", "right"];
-        const side = isWide && actor !== you ? order.find((each) => fits[each]) ?? "" : "";
+        if (!fits[known.side]) known.side = order.find((each) => fits[each]) ?? ""; // where it is, it stays
+        const side = isWide && actor !== you ? known.side : "";
         const wanted = side ? middle.x + (side === "right" ? far : -far - width) : head.x - width / 2;
         let left = Math.min(Math.max(wanted, GAP), box.width - width - GAP);
         let top = Math.min(Math.max(side ? middle.y - height / 2 : head.y - height - 14, box.top), box.bottom - height - GAP);

@@ -37,6 +37,7 @@ export function scene(place, insets) {
   let told = null;
   let you = "";
   let isStale = true;
+  let isStill = false;
   let last = 0;
   let cost = 0; // ms of a picture of late
   const eye = { from: new THREE.Vector3(...FROM.wide.side), at: new THREE.Vector3(0.5, 0, 0.85), far: 4 };
@@ -97,9 +98,9 @@ export function scene(place, insets) {
     goal.far = far;
   }
 
-  function look(part, now) {
+  function look(part, now, isCalm) {
     const direction = new THREE.Vector3(...FROM[camera.aspect > 1 ? "wide" : "tall"][you ? "seat" : "side"]).normalize();
-    if (!you && !still.matches) direction.applyAxisAngle(camera.up, 0.16 * Math.sin(now / 9)); // it goes to and fro, slowly
+    if (!you && !isCalm) direction.applyAxisAngle(camera.up, 0.16 * Math.sin(now / 9)); // it goes to and fro, slowly
     aim(inView(), direction);
     const swing = part === 1 ? 1 : part * 0.45;
     eye.from.lerp(direction, swing).normalize();
@@ -127,6 +128,7 @@ export function scene(place, insets) {
       stool.show(!company());
       const acts = section.people.find((each) => each.id === you)?.acts.length;
       for (const thing of section.things) if (thing.kind === "hand") pieces.get(thing.id).mesh.visible = thing.owner !== you || Boolean(acts);
+      isStill = false;
       robot.put(section.body, where);
       if (you && section.body?.looks_at === you) robot.cone.visible = false; // one sees its eyes
       isStale = true;
@@ -135,16 +137,18 @@ export function scene(place, insets) {
     draw(now, bonds, dark) {
       const passed = Math.min(0.25, now - last);
       const part = last === 0 || still.matches ? 1 : 1 - Math.exp(-passed / SMOOTH);
-      const isDrifting = !you && !still.matches;
+      const isCalm = still.matches || cost > SLOW; // nothing moves but what moves out there
+      const isDrifting = !you && !isCalm;
       if (!isStale && !isDrifting) return false;
       if (passed < (cost > SLOW ? 0.15 : 0.015)) return false;
       last = now;
       const began = performance.now();
       const moves = [robot, ...pieces.values(), ...people.values()].map((each) => each.step(part)).some(Boolean);
-      const turns = look(part, now);
-      const lives = looks.draw(told, you, bonds, now, still.matches);
+      const turns = look(part, now, isCalm);
+      const lives = looks.draw(told, you, bonds, now, isCalm);
       light.theme(dark ? LIGHTS.dark : LIGHTS.light, robot.cone);
-      isStale = moves || turns || lives;
+      isStill = !moves && !turns;
+      isStale = !isStill || lives;
       renderer.render(world, camera);
       cost += (performance.now() - began - cost) * 0.1;
       if (cost > SLOW && renderer.shadowMap.enabled && renderer.info.render.frame > 20) {
@@ -182,8 +186,9 @@ export function scene(place, insets) {
       pieces.get(id)?.put({ ...told.things.find((each) => each.id === id), at, outline: moved(told.things.find((each) => each.id === id), at) }, told.body);
       isStale = true;
     },
-    get slow() {
-      return cost;
+    // Figures and camera are where they are to be.
+    get isStill() {
+      return isStill;
     },
   };
   return own;
