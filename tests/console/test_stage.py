@@ -44,6 +44,7 @@ LATER = """void ((by) => {
 })(%d)"""
 """Let the page's clock jump by some milliseconds."""
 SEAT = "document.querySelector('.sit')"
+IS_FREE = f"!{SEAT}.getAttribute('aria-disabled')"
 PERSON = "window.stage.state.person"
 
 
@@ -92,13 +93,11 @@ async def opened(place: Place, more: str = "", language: str = "en-US") -> Async
 
 
 async def shows(page: Page) -> None:
-    await page.until(
-        f"window.stage?.state.scene?.body && {SEAT} && (!{SEAT}.disabled || {SEAT}.hidden || {PERSON})", 60
-    )
+    await page.until(f"window.stage?.state.scene?.body && ({IS_FREE} || {SEAT}.hidden || {PERSON})", 60)
 
 
 async def mouse(page: Page, kind: str, x: float, y: float) -> None:
-    """Press, move or release. No finger, for a slow page takes one for a finger that stays: that means something else."""
+    """Press, move or release. No finger: of a slow page it seems to stay long, which means something else."""
     held = {"button": "left", "buttons": int(kind != "mouseReleased"), "clickCount": 1}
     await page.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, **held)
 
@@ -154,6 +153,7 @@ async def happens(place: Place, action: str, target: str = "") -> AsyncIterator[
 
 
 async def sit(page: Page) -> str:
+    await page.until("window.stage.shown.isStill", 60)
     await press(page, ".sit")
     await page.until(PERSON)
     return str(await page.value(PERSON))
@@ -188,7 +188,7 @@ async def test_a_visitor_sits_down_at_one_touch_looks_points_moves_talks_and_lea
         await page.until(f"{said}.includes('Yes.')")
 
         await press(page, ".do:nth-of-type(6)")
-        await page.until(f"!{PERSON} && !{SEAT}.disabled")
+        await page.until(f"!{PERSON} && {IS_FREE}")
 
 
 @needs_browser
@@ -314,6 +314,7 @@ async def test_axe_finds_nothing_to_complain_of(place: Place) -> None:
         await sit(page)
         for dark in (False, True):
             await page.look(*PHONE, dark=dark)
+            await page.until("window.stage.shown.isStill")
             await press(page, ".quick:nth-of-type(1)")
             await page.until("document.querySelector('.bubble.on')")
             passed, broken = await page.value(checks)
@@ -422,7 +423,7 @@ async def test_a_visitor_of_a_minute_on_a_phone_never_scrolls(tmp_path: Path, pl
             assert scrolled == [[0, [], []]] * len(scrolled)
             assert await page.value("Number(document.body.dataset.frames)") > 20
             assert await page.value(laid) != new
-            await page.until(f"{laid} === {json.dumps(new)} && !{SEAT}.disabled", 40)  # it has begun anew
+            await page.until(f"{laid} === {json.dumps(new)} && {IS_FREE}", 40)  # it has begun anew
         demo.terminate()
         assert demo.wait(30) == 143
     assert "Traceback" not in (tmp_path / "demo").read_text()

@@ -32,7 +32,7 @@ export function bar({ top, bottom, order, turn }) {
 
   const hint = element("p", { class: "hint", role: "status" });
   const sit = button("sit", () => {
-    if (isSitting) return;
+    if (isSitting || sit.getAttribute("aria-disabled")) return;
     isSitting = true;
     draw();
     order({ do: "sit", name: "" });
@@ -93,7 +93,7 @@ export function bar({ top, bottom, order, turn }) {
     here.hidden = !person;
     away.hidden = welcome.hidden = Boolean(person);
     sit.hidden = Boolean(denied);
-    sit.disabled = !isFree;
+    isFree ? sit.removeAttribute("aria-disabled") : sit.setAttribute("aria-disabled", "true"); // it keeps the focus
     sit.textContent = isSitting ? text.sitting : company.length ? text.beside(company.join(text.and)) : text.sit;
     welcome.firstChild.textContent = text.hello;
     welcome.lastChild.textContent = denied ? text.onlooker : company.length ? `${text.others(company.join(text.and))} ${text.welcome}` : text.welcome;

@@ -6,19 +6,19 @@ const EACH = 0.28; // and for each word
 const GAP = 8; // pixels between two bubbles, and to the edge
 const NEWEST = 26; // words that a bubble shows at most: of a long turn the newest
 
-export function heads(place) {
+export function heads(overlay) {
   const bubbles = new Map(); // by actor: the newest turn only
   const names = new Map();
 
-  function bubble(actor, isRobot, isYou) {
+  function bubble(actor) {
     const text = element("p", {});
-    const made = element("div", { class: `bubble ${isRobot ? "robot" : isYou ? "you" : "person"}` }, text);
-    place.append(made);
+    const made = element("div", { class: "bubble" }, text);
+    overlay.append(made);
     bubbles.set(actor, { made, text, words: [], since: null, over: null });
     return bubbles.get(actor);
   }
 
-  function say(known, turn, now) {
+  function say(known, turn, at) {
     if (known.since !== turn.since) {
       known.text.replaceChildren();
       known.words = [];
@@ -33,18 +33,19 @@ export function heads(place) {
     known.words = words;
     [...known.text.children].forEach((node, index) => (node.hidden = words.length - index > NEWEST));
     known.text.classList.toggle("long", words.length > NEWEST);
-    known.over = turn.open ? null : known.over ?? now;
+    known.over = turn.open ? null : known.over ?? at;
   }
 
   return {
-    // talk, scene: sections. you: id of who looks at this page. where: place on the page of a place of the world.
-    draw({ talk, scene, you, text, now, where, box }) {
+    // talk, scene: sections. you: id of who looks at this page. now: seconds of the picture; at: of the page's own clock.
+    // where: place on the page of a place of the world.
+    draw({ talk, scene, you, text, now, at, where, box }) {
       const latest = new Map();
       for (const turn of talk.bubbles) latest.set(turn.actor, turn);
       for (const [actor, turn] of latest) {
-        const known = bubbles.get(actor) ?? bubble(actor, actor === scene.robot, actor === you);
+        const known = bubbles.get(actor) ?? bubble(actor);
         const isOld = known.since === null && !turn.open && now - turn.since > STAYS; // from before this page looked
-        say(known, turn, now);
+        say(known, turn, at);
         if (isOld) known.over = -Infinity;
       }
       const anchors = new Map();
@@ -55,8 +56,10 @@ export function heads(place) {
       for (const [actor, known] of [...bubbles].sort(([a], [b]) => (b === scene.robot) - (a === scene.robot))) {
         const anchor = anchors.get(actor);
         const stays = STAYS + EACH * known.words.length;
-        const isOn = known.words.length > 0 && (known.over === null || now - known.over < stays) && (anchor || actor === you);
+        const isOn = known.words.length > 0 && (known.over === null || at - known.over < stays) && (anchor || actor === you);
         known.made.classList.toggle("on", Boolean(isOn));
+        known.made.classList.toggle("robot", actor === scene.robot);
+        known.made.classList.toggle("you", actor === you);
         if (!isOn) {
           if (!latest.has(actor)) {
             known.made.remove();
@@ -94,15 +97,15 @@ export function heads(place) {
         if (!names.has(person.id)) {
           const level = element("span", { class: "level" });
           const made = element("div", { class: "name" }, element("i", { class: "ring" }), element("b", {}, person.id), level);
-          place.append(made);
+          overlay.append(made);
           names.set(person.id, { made, level });
         }
         const { made, level } = names.get(person.id);
         const measure = talk.levels.find(({ actor }) => actor === person.id);
         put(made, measure, person.speaks);
         level.textContent = person.speaks ? text.speaks : text.levels[measure?.level ?? "unknown"];
-        const at = where([person.at[0], person.at[1], person.at[2] - 0.26]);
-        made.style.transform = `translate(${Math.round(Math.min(Math.max(at.x, made.offsetWidth / 2 + GAP), box.width - made.offsetWidth / 2 - GAP))}px, ${Math.round(at.y)}px) translate(-50%, 0)`;
+        const place = where([person.at[0], person.at[1], person.at[2] - 0.26]);
+        made.style.transform = `translate(${Math.round(Math.min(Math.max(place.x, made.offsetWidth / 2 + GAP), box.width - made.offsetWidth / 2 - GAP))}px, ${Math.round(place.y)}px) translate(-50%, 0)`;
       }
     },
   };

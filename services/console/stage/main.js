@@ -92,7 +92,7 @@ const link = follow({
   place: "stage/frames",
   take(frame, isFirst) {
     const behind = clock() - frame.now;
-    offset = offset === null || behind < offset || behind > offset + 1 ? behind : offset + (behind - offset) * 0.01;
+    offset = offset === null || isFirst || behind < offset ? behind : offset + (behind - offset) * 0.002; // frames come late, never early
     if (frame.sections?.scene) state.scene = frame.sections.scene;
     if (frame.sections?.talk) state.talk = frame.sections.talk;
     if (frame.you) {
@@ -184,7 +184,7 @@ function tick() {
   bar.hint(hint(now));
   touch?.draw();
   const where = shown ? (place) => shown.onPage(place) : () => ({ x: box.width / 2, y: box.top });
-  heads.draw({ talk: state.talk, scene: state.scene, you: state.person, text: state.text, now: offset === null ? 0 : now - offset, where, box });
+  heads.draw({ talk: state.talk, scene: state.scene, you: state.person, text: state.text, now: now - offset, at: now, where, box });
 }
 
 speak();

@@ -55,8 +55,8 @@ export function scene(place, insets) {
   // Everything that has to be in view.
   function inView() {
     const body = told?.body;
-    const top = body?.eyes ? body.eyes : [0, 0, 1.17];
-    const found = [[top[0] - 0.1, top[1], top[2] + 0.13], [0, -0.3, top[2] - 0.25], [0, 0.3, top[2] - 0.25]];
+    const top = (body?.eyes ?? [0, 0, 1.17]).map((each) => Math.round(each * 10) / 10); // a head that moves does not move the camera
+    const found = [[top[0] - 0.1, top[1], top[2] + 0.15], [0, -0.3, top[2] - 0.25], [0, 0.3, top[2] - 0.25]];
     for (const thing of told?.things ?? []) {
       if (thing.kind === "object") found.push(...[-1, 1].flatMap((x) => [-1, 1].map((y) => [thing.at[0] + x * ROOM, thing.at[1] + y * ROOM, thing.at[2]])));
     }
@@ -98,6 +98,7 @@ export function scene(place, insets) {
     goal.far = far;
   }
 
+  // Returns how far the camera still is from there.
   function look(part, now, isCalm) {
     const direction = new THREE.Vector3(...FROM[camera.aspect > 1 ? "wide" : "tall"][you ? "seat" : "side"]).normalize();
     if (!you && !isCalm) direction.applyAxisAngle(camera.up, 0.16 * Math.sin(now / 9)); // it goes to and fro, slowly
@@ -111,7 +112,7 @@ export function scene(place, insets) {
     camera.lookAt(eye.at);
     camera.updateProjectionMatrix();
     camera.updateMatrixWorld();
-    return eye.from.distanceToSquared(direction) + eye.at.distanceToSquared(goal.at) + (eye.far - goal.far) ** 2 > 1e-6;
+    return eye.from.distanceToSquared(direction) + eye.at.distanceToSquared(goal.at) + (eye.far - goal.far) ** 2;
   }
 
   const own = {
@@ -128,7 +129,6 @@ export function scene(place, insets) {
       stool.show(!company());
       const acts = section.people.find((each) => each.id === you)?.acts.length;
       for (const thing of section.things) if (thing.kind === "hand") pieces.get(thing.id).mesh.visible = thing.owner !== you || Boolean(acts);
-      isStill = false;
       robot.put(section.body, where);
       if (you && section.body?.looks_at === you) robot.cone.visible = false; // one sees its eyes
       isStale = true;
@@ -147,8 +147,8 @@ export function scene(place, insets) {
       const turns = look(part, now, isCalm);
       const lives = looks.draw(told, you, bonds, now, isCalm);
       light.theme(dark ? LIGHTS.dark : LIGHTS.light, robot.cone);
-      isStill = !moves && !turns;
-      isStale = !isStill || lives;
+      isStill = turns < 1e-4;
+      isStale = moves || turns > 1e-6 || lives;
       renderer.render(world, camera);
       cost += (performance.now() - began - cost) * 0.1;
       if (cost > SLOW && renderer.shadowMap.enabled && renderer.info.render.frame > 20) {
@@ -186,7 +186,7 @@ export function scene(place, insets) {
       pieces.get(id)?.put({ ...told.things.find((each) => each.id === id), at, outline: moved(told.things.find((each) => each.id === id), at) }, told.body);
       isStale = true;
     },
-    // Figures and camera are where they are to be.
+    // The camera is where it is to be.
     get isStill() {
       return isStill;
     },
