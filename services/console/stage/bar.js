@@ -95,6 +95,7 @@ export function bar({ top, bottom, order, turn }) {
     sit.hidden = Boolean(denied);
     isFree ? sit.removeAttribute("aria-disabled") : sit.setAttribute("aria-disabled", "true"); // it keeps the focus
     sit.textContent = isSitting ? text.sitting : company.length ? text.beside(company.join(text.and)) : text.sit;
+    welcome.classList.toggle("company", company.length > 0);
     welcome.firstChild.textContent = text.hello;
     welcome.lastChild.textContent = denied ? text.onlooker : company.length ? `${text.others(company.join(text.and))} ${text.welcome}` : text.welcome;
     hold.classList.toggle("on", isSpeaking);
