@@ -136,7 +136,7 @@ class You(Struct, frozen=True):
 
 
 class Shown(Protocol):
-    """What a page shows: the picture, or a part of it."""
+    """Source of what a page shows: the picture, or a part of it."""
 
     @property
     def versions(self) -> dict[str, int]:

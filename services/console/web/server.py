@@ -172,7 +172,7 @@ def _app(
 
 
 def _page(folder: Path, robot: str, token: str) -> Callable[[Request], Awaitable[Response]]:
-    """What answers with the `index.html` of a folder, and takes the token out of its address at the first visit.
+    """Answer with the `index.html` of a folder, and takes the token out of its address at the first visit.
 
     token: empty: there is none.
     """

@@ -32,7 +32,7 @@ class Bubble(Struct, frozen=True):
 
 
 class VoiceNow(Struct, frozen=True):
-    """Somebody who speaks at this instant. to: ids of those it is for; empty: nobody knows."""
+    """Voice of somebody who speaks at this instant. to: ids of those it is for; empty: nobody knows."""
 
     actor: str
     to: tuple[str, ...]
