@@ -56,7 +56,7 @@ class LevelShown(Struct, frozen=True):
     value: float | None
 
 
-class Talk(Struct, frozen=True):
+class StageTalk(Struct, frozen=True):
     """All of the stage but what has a place in space. played: people that a program plays.
 
     task: the robot does its task with whoever comes first.
@@ -79,12 +79,12 @@ def talk(
     health: Iterable[sections.Health],
     held: bool,
     reporters: Mapping[str, str],
-) -> Talk:
+) -> StageTalk:
     """Make the talk of sections of the picture. held: the robot is. reporters: the participant that tells of each."""
     here = {each.name: each.here for each in health}
     services = [each.here for each in health if each.service]
     bubbles = [Bubble(each.actor, each.since, each.words, each.open) for each in words if each.words]
-    return Talk(
+    return StageTalk(
         state="away" if not all(services) else "held" if held else "ready",
         bubbles=tuple(bubbles[-BUBBLES:]),
         voices=tuple(VoiceNow(each.actor, each.to) for each in floor if each.until is None),
@@ -134,7 +134,7 @@ class StageFace:
         """Seconds of the picture at a local instant."""
         return self._picture.zero(at)
 
-    def _make(self) -> Talk:
+    def _make(self) -> StageTalk:
         made = self._picture.made
         people = [made(name) for name in self._picture.versions if name.startswith(MEASURES)]
         held = bool(made("switched").held)
