@@ -125,6 +125,7 @@ WATCHED = (
     keys.ANY_REQUEST_STATE, keys.ANY_FEEDBACK, keys.SYNC_POINT, keys.ANY_ACTION, keys.UTTERANCE,
     keys.ANY_CONNECTION_EVENT, keys.ANY_FAULT, keys.HEAD_OWNER, keys.HELD, keys.BODY_HELD, keys.BODY_FAULTS,
     keys.STUDY_CONDITION, keys.ANY_OPEN_EVENTS, keys.ANY_STATISTICS, keys.FLOOR, keys.ANY_INTERJECTION,
+    keys.SAME_PEOPLE,
 )  # fmt: skip
 """Expressions for all that a person watches, or a program that drives the robot."""
 ANY_STATUS = keys.status("*")
@@ -189,7 +190,7 @@ TABLE: tuple[Row, ...] = (
         "generation", keys.FRAGMENT_FEEDBACK, keys.TURN_CLOSED, keys.HEAD_OWNER, keys.STUDY_CONDITION,
         heard=(keys.ANY_REQUEST_STATE, keys.FEEDBACK, keys.ANY_CONNECTION_EVENT, keys.WORLD, keys.SYNC_POINT,
                keys.ANY_ACTION, keys.ANY_PERCEIVED_ONGOING, keys.UTTERANCE, keys.ROBOT_STATE, keys.ANY_STATISTICS,
-               keys.ANY_INTERJECTION, keys.FLOOR),
+               keys.ANY_INTERJECTION, keys.FLOOR, keys.SAME_PEOPLE),
     ),
     *_commands("generation", "block", "behavior", "turn"),
     Row("generation", "asks", keys.DESCRIBE),
@@ -199,14 +200,14 @@ TABLE: tuple[Row, ...] = (
     Row("realizer", "asks", keys.ESTIMATE),
     *_service(
         "recognition", keys.ANY_CONNECTION_EVENT, keys.RECOGNIZED_ACTION, keys.ANY_OPEN_EVENTS, keys.ANY_STATISTICS,
-        keys.ANY_INTERJECTION, keys.FLOOR,
+        keys.ANY_INTERJECTION, keys.FLOOR, keys.SAME_PEOPLE,
         heard=(keys.ROBOT_ACTION, keys.PERCEIVED_ACTION, keys.UTTERANCE, keys.ROBOT_ONGOING,
                keys.ANY_PERCEIVED_ONGOING,
                keys.FEEDBACK, keys.HEAD_OWNER, keys.WORLD, *_RAW, keys.ROBOT_STATE),
     ),
     *_service(
         "control", keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ROBOT_ONGOING, keys.ROBOT_STATE, keys.ROBOT_MOTION,
-        keys.BODY_HELD, keys.BODY_FAULTS, keys.ROBOT_SEEN, heard=(keys.WORLD,),
+        keys.BODY_HELD, keys.BODY_FAULTS, keys.ROBOT_SEEN, heard=(keys.WORLD, keys.SAME_PEOPLE),
         served=(keys.ESTIMATE, keys.DESCRIBE),
     ),
     *(

@@ -4,6 +4,7 @@ The dialects of BML (thesis draft, draft without namespace, BML 1.0) decode to t
 reference stays the string its author wrote (`speech-1:end+0.5`); `schemas/references.py` parses it.
 """
 
+from collections.abc import Mapping
 from typing import Literal
 
 from msgspec import Struct
@@ -13,6 +14,41 @@ from engage_hri.schemas.units import Degrees, Probability, Seconds
 Action = Literal["look", "point", "nod", "shake", "speak", "act"]
 """Kinds of actions that an actor can be seen to do; `act` is the manipulation of an object."""
 EventKind = Literal["directed_gaze", "mutual_facial_gaze", "adjacency_pair", "backchannel"]
+
+
+class KindOfEvent(Struct, frozen=True, kw_only=True):
+    """A kind of connection event, for all who list, count or show them.
+
+    title: as people write it. short: the same where there is little room, if it differs. prefix: of the ids.
+    delay: mean seconds until it is decided, by Table 2.1. Whoever plans with it knows no better.
+    is_answered: the other has to respond; else the sign of the other is the event, and can be neither late nor fail.
+    needs_objects: the robot cannot begin it without an object.
+    """
+
+    title: str
+    short: str = ""
+    prefix: str
+    delay: Seconds
+    is_answered: bool = True
+    needs_objects: bool = False
+
+
+EVENT_KINDS: Mapping[EventKind, KindOfEvent] = {
+    "directed_gaze": KindOfEvent(title="directed gaze", prefix="dg", delay=0.3, needs_objects=True),
+    "mutual_facial_gaze": KindOfEvent(title="mutual facial gaze", short="mutual gaze", prefix="mfg", delay=0.7),
+    "adjacency_pair": KindOfEvent(title="adjacency pair", prefix="ap", delay=0.4),
+    "backchannel": KindOfEvent(title="backchannel", prefix="bc", delay=0.0, is_answered=False),
+}
+"""Kinds of connection events, in the order of all tables. `services/recognition/events` has a module for each."""
+ACTIONS: Mapping[Action, tuple[str, str]] = {
+    "look": ("looks", "at "),
+    "point": ("points", "at "),
+    "nod": ("nods", "to "),
+    "shake": ("shakes the head", "to "),
+    "speak": ("speaks", "to "),
+    "act": ("moves", ""),
+}
+"""Words for each action of somebody, and those that come before its targets."""
 Cause = Literal["turn", "reference", "response", "maintenance", "human"]
 Hand = Literal["LEFT_HAND", "RIGHT_HAND", "BOTH_HANDS"]
 Side = Literal["LEFT", "RIGHT", "BOTH"]
@@ -275,9 +311,9 @@ class Event(Behavior, frozen=True, kw_only=True, tag="event", omit_defaults=True
     objects: ids of what it is about.
     cause: what the robot begins it for. optional: its failure does not count.
     limit: time within which the person has to respond; None: recognition's default.
-    anchors: sync references of the same block (`phrase-1:start`). The limit runs from the latest of these and the
-    start of the event, so not before all of them are realised or their block has ended. An adjacency pair has none:
-    its limit runs from the `ended` signal of its turn.
+    anchors: sync references of the same block (`phrase-1:start`). A gaze event starts when all of them are realised
+    or their block has ended, or before that when the robot looks or points there. Its limit runs from the latest of
+    its start and these. An adjacency pair has none: its limit runs from the `ended` signal of its turn.
     turn: of an adjacency pair, the turn that opens it.
     """
 
@@ -352,6 +388,8 @@ _Spelled = (
     Gaze | GazeShift | Pointing | Gesture | Head | HeadDirectionShift | Face | FaceLexeme | FaceFacs | FaceShift
     | Posture | PostureShift | Pose | Locomotion | Speech | Wait | Emit | Event | TurnSignal
 )  # fmt: skip
+Looks = Gaze | GazeShift | HeadDirectionShift
+"""Behaviors that move the head to look at something."""
 BlockBehavior = _Spelled | Unknown
 """Behaviors that a BML block may hold."""
 FragmentBehavior = _Spelled | Reference

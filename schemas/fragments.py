@@ -135,8 +135,9 @@ class ReferenceMade(Struct, frozen=True, kw_only=True, omit_defaults=True):
     by: `pointing` if the stroke of a point came, else `look` if a gaze came to the object, else `words` if words of
     the phrase were said, else `nothing`.
     phrase: the words of it that were said.
-    looked: the person looked there; None: nothing was shown, or the robot did not wait for that, or it is undecided.
-    delay: seconds until the person did.
+    looked: the person looked there, of several all of them; None: nothing was shown, or the robot did not wait for
+    that, or it is undecided.
+    delay: seconds until the person did, of several the last of them.
     """
 
     reference: str

@@ -64,6 +64,8 @@ ROBOT_SEEN = f"{PREFIX}/state/control/seen"
 
 FLOOR = f"{PREFIX}/state/recognition/floor"
 """`Floor`."""
+SAME_PEOPLE = f"{PREFIX}/state/recognition/same_people"
+"""`SamePeople`: which ids are one person."""
 ROBOT_MOTION = f"{PREFIX}/stream/control/robot_state"
 """The same as `ROBOT_STATE`, many times a second, while somebody listens."""
 NET = f"{PREFIX}/stream/realizer/net"

@@ -51,7 +51,7 @@ Message = (
     | world.World
     | recognition.RequestEvent | recognition.EventOutcome | recognition.SignalTurn | recognition.TurnOutcome
     | recognition.ConnectionEvent | recognition.OpenEvents | recognition.Statistics
-    | recognition.Interjection | recognition.Floor
+    | recognition.Interjection | recognition.Floor | recognition.SamePeople
     | participants.Taken | participants.AskStatus | participants.Status | participants.ServiceSettings
     | participants.PeerAlive | participants.PeerGone
 )  # fmt: skip
@@ -72,7 +72,7 @@ COMMANDS: Mapping[str, tuple[type[requests.Request], ...]] = {
 
 OUTWARD = (
     recognition.ConnectionEvent, recognition.OpenEvents, recognition.Statistics, recognition.Interjection,
-    recognition.Floor, perception.Utterance,
+    recognition.Floor, recognition.SamePeople, perception.Utterance,
 )  # fmt: skip
 """Messages for programs of others, a few a second at most: published as JSON, which every language reads. All others
 are MessagePack."""

@@ -28,7 +28,7 @@ class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event",
 
     id: made by recognition. kind: which of the four. state: the one that it has now.
     initiator: actor id of the one that began it. responder: actor id of the one that is to answer.
-    started: when it began. objects: ids of the objects that it is about.
+    started: when it began: of a gaze, when the initiator's look had arrived. objects: ids of what it is about.
     cause: what it was begun for; `human`: a person began it. optional: its failure does not count.
     delay: seconds from the initiator's start to the responder's start; of an adjacency pair from the end of the turn,
     and negative for an early answer; of a failed event from its start to its failure; None while undecided and for
@@ -140,12 +140,35 @@ class Floor(Struct, frozen=True, kw_only=True, tag="floor", omit_defaults=True):
     speeches: tuple[FloorSpeech, ...] = ()
 
 
+class SamePerson(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Another id of a person. actor: this id. name: the one by which the person is told of.
+
+    is_guess: it was first seen where the person had just been lost. Else perception has said so.
+    """
+
+    actor: str
+    name: str
+    is_guess: bool = False
+
+
+class SamePeople(Struct, frozen=True, kw_only=True, tag="same_people", omit_defaults=True):
+    """state: recognition. The people of whom perception tells by several ids.
+
+    What perception tells of the other ids is of the person with this name, and so is what the robot does to them.
+
+    at: the instant of the last change. people: all other ids, those that have been known for longest first.
+    """
+
+    at: Stamp
+    people: tuple[SamePerson, ...] = ()
+
+
 class RequestEvent(Request, frozen=True, kw_only=True, tag="request_event", omit_defaults=True):
     """cmd: realizer -> recognition: begin a connection event (thesis Fig. 5.2). Terminal state: `EventOutcome`.
 
     Refused if it is invalid (unknown actor, no objects).
 
-    at: when the event began: the realizer released it then.
+    at: when the robot set out: the realizer released it then. A gaze event starts when it has arrived.
     """
 
     block: str

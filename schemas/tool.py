@@ -132,10 +132,24 @@ class ToolInput(Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_un
             "only one."
         ),
     ] = ""
+    interruptible: Annotated[
+        bool | str | tuple[str, ...],
+        Meta(
+            description="Who may interrupt it: an id, a list of ids, `*` for anybody, false for nobody, as in a "
+            "warning; left out or empty: those you speak to. Of a turn in pieces the `beginning` says it for all."
+        ),
+    ] = ""
+    interruptible_after: Annotated[
+        Literal[0, 1, 2, 4],
+        Meta(
+            description="Seconds for which somebody has to speak to interrupt it. 0, or left out: at once, or as "
+            "the `beginning` said."
+        ),
+    ] = 0
     within: Annotated[
         Literal[0, 3, 6, 10, 20, 30, 60],
         Meta(
-            description="Seconds that the person has to answer, if not as usual (4.5 for a reply, 8 for an action): "
+            description="Seconds that the person has to answer, if not as usual (6 for a reply, 8 for an action): "
             "6 for a question to think about. 0, or left out: as usual."
         ),
     ] = 0
@@ -318,6 +332,8 @@ def fragment_of(parts: Iterable[Part], turn: ToolInput, id: str) -> TurnFragment
         behaviors=tuple(behaviors),
         constraints=tuple(order),
         addressee=turn.addressee,
+        interruptible=None if turn.interruptible in ("", ()) else turn.interruptible,
+        interruptible_after=turn.interruptible_after or None,
         delay=turn.thinking and turn.turn_status in ("beginning", "middle"),
         accept=ANSWERS[turn.expects],
         within=turn.within or None,

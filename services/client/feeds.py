@@ -9,11 +9,13 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, NoReply
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.bus.interface import Bus, Reading, Received, Subscription
+from engage_hri.schemas.world import World
+from engage_hri.services.bus.interface import Bus, Keep, Reading, Received, Subscription
 from engage_hri.services.client.event_stream import EventStream
 from engage_hri.services.client.inputs import taken
 from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports, events
 from engage_hri.services.reports.ongoing_actions import ActionEvent, TimedReport
+from engage_hri.services.reports.same_people import PeopleNames
 
 M = TypeVar("M")
 
@@ -100,8 +102,8 @@ class NewFeed(Feed[M]):
 class DerivedFeed(Feed[M]):
     """News made of messages and of time that passes: several of one message, or none."""
 
-    def __init__(self, bus: Bus, patterns: Iterable[str]) -> None:
-        super().__init__(bus.subscribe(*patterns), (), bus.now)
+    def __init__(self, bus: Bus, patterns: Iterable[str], keep: Keep = Keep.EVERY) -> None:
+        super().__init__(bus.subscribe(*patterns, keep=keep), (), bus.now)
         self._bus = bus
         self._told: deque[M] = deque()
 
@@ -161,6 +163,40 @@ class EventFeed(DerivedFeed[ConnectionEvent]):
         return self._stream.expire(self._now())
 
 
+SAME_PATIENCE: Seconds = 0.2
+"""Time for which the first world waits for the news who is one person: recognition may not be there. Ours."""
+
+
+class WorldFeed(DerivedFeed[World]):
+    """The world with each person once, by the id by which recognition tells of them. Only the newest is kept."""
+
+    def __init__(self, bus: Bus) -> None:
+        super().__init__(bus, (keys.SAME_PEOPLE, keys.WORLD), Keep.LATEST)
+        self._names = PeopleNames()
+        self._is_named = False
+        self._last: World | None = None
+        """As it was published."""
+        self._waits_until: Seconds | None = None
+
+    @property
+    def _due(self) -> Seconds | None:
+        return self._waits_until
+
+    def _taken(self, received: Received) -> Iterable[World]:
+        if isinstance(received.message, World):
+            self._last = received.message
+            if self._is_named:
+                return self._passed()
+            self._waits_until = self._waits_until or self._now() + SAME_PATIENCE
+            return ()
+        changes = self._names.take(received.message)
+        return self._passed() if changes or not self._is_named else ()
+
+    def _passed(self) -> Iterable[World]:
+        self._is_named, self._waits_until = True, None
+        return () if self._last is None else (self._names.named(self._last),)
+
+
 class ActionFeed(DerivedFeed[ActionEvent]):
     """Actions as all who report them together tell them: they end, also if their reporter was killed.
 
@@ -168,7 +204,8 @@ class ActionFeed(DerivedFeed[ActionEvent]):
     """
 
     def __init__(self, bus: Bus) -> None:
-        super().__init__(bus, (keys.ANY_ACTION, keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING, keys.ANY_ROBOT_ALIVE))
+        super().__init__(bus, (keys.ANY_ACTION, keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING, keys.ANY_ROBOT_ALIVE,
+                               keys.SAME_PEOPLE))  # fmt: skip
         self._reports = ActionReports(bus.robot, REPORT_GRACE, bus.clock, self._instant)
 
     @property

@@ -42,7 +42,7 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.config import Mode
 from engage_hri.services.bus.interface import Bus, Hub, Keep
 from engage_hri.services.client.event_stream import EventStream
-from engage_hri.services.client.feeds import ActionFeed, EventFeed, Feed, LevelFeed, NewFeed, first_of
+from engage_hri.services.client.feeds import ActionFeed, EventFeed, Feed, LevelFeed, NewFeed, WorldFeed, first_of
 from engage_hri.services.client.inputs import (
     BlockSource,
     FragmentSource,
@@ -261,8 +261,12 @@ class Robot(OrderedRobot):
         return self._feed((Fault,), keys.ANY_FAULT)
 
     def worlds(self) -> Feed[World]:
-        """Follow the world: now, if anything is perceived, and whenever it has changed. Only the newest is kept."""
-        return self._feed((World,), keys.WORLD, keep=Keep.LATEST)
+        """Follow the world: now, if anything is perceived, and whenever it has changed. Only the newest is kept.
+
+        A person of whom perception tells by several ids is there once, by the id by which events tell of them.
+        """
+        self._requests.check()
+        return WorldFeed(self._bus)
 
     def head_owners(self) -> Feed[HeadOwner]:
         """Follow the owner of the robot's head, with the reason: now, and at every change."""

@@ -29,6 +29,7 @@ FOLLOWED = (
     keys.ANY_STATISTICS,
     keys.ANY_INTERJECTION,
     keys.FLOOR,
+    keys.SAME_PEOPLE,
     keys.HEAD_OWNER,
     keys.HELD,
     keys.BODY_HELD,

@@ -9,10 +9,12 @@ from collections.abc import Callable, Iterator
 
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.schemas.world import World
 from engage_hri.services.bus.samples import Received
 from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports, events
 from engage_hri.services.reports.in_force import WorldReport
 from engage_hri.services.reports.ongoing_actions import ActionEvent
+from engage_hri.services.reports.same_people import PeopleNames
 
 
 class Heard:
@@ -35,6 +37,7 @@ class Heard:
         self._now: Seconds = float("-inf")
         self._reports = ActionReports(robot, REPORT_GRACE, clock, self._instant)
         self._world = WorldReport(REPORT_GRACE)
+        self._names = PeopleNames()
 
     @property
     def deadline(self) -> Seconds | None:
@@ -54,11 +57,12 @@ class Heard:
         self._now = max(self._now, now)
         one = received
         told = self._reports.take(one.message, one.key, one.source, one.life, self._now, past=one.past)
+        self._names.take(one.message)
         if not isinstance(one.message, ActionEvent):
-            yield one.message, self._told(one.message, one.at)
+            yield self._names.named(one.message), self._told(one.message, one.at)
         yield from events(told, self._clock)
         world = self._world.take(one.message, one.source, one.life, self._now)
-        if world is not None and world is not one.message:
+        if world is not None and not isinstance(one.message, World):
             yield world, self._now
 
     def _instant(self, stamp: Stamp) -> Seconds:

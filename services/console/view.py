@@ -18,7 +18,7 @@ from engage_hri.schemas.fragments import Claim, HeadOwner, StudyCondition
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, Utterance
-from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
+from engage_hri.schemas.recognition import ConnectionEvent, SamePeople, Statistics, WindowStatistics
 from engage_hri.schemas.text import joined
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.reports.in_force import InForce
@@ -130,6 +130,9 @@ def feed(scene: Scene, message: Message, at: Seconds) -> Scene:
     match message:
         case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
             return _act(scene, message, at)
+        case SamePeople(people=people):
+            others = {each.actor for each in people}
+            return replace(scene, actors={id: each for id, each in scene.actors.items() if id not in others})
         case WordSpoken():
             return _speak(scene, message, at)
         case Utterance(text=text) if text:

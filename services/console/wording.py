@@ -17,14 +17,6 @@ from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.vocabulary import normal
 
-KINDS: dict[of.EventKind, str] = {
-    "directed_gaze": "directed gaze",
-    "mutual_facial_gaze": "mutual facial gaze",
-    "adjacency_pair": "adjacency pair",
-    "backchannel": "backchannel",
-}
-"""Event kinds as people write them, in the order of the tables."""
-
 SEEN: Seconds = 0.005
 """Error of a delay from which on it changes the two digits that are shown."""
 
@@ -44,18 +36,8 @@ def number(value: Seconds | None, sign: bool = False) -> str:
 
 def clock(value: Seconds) -> str:
     """Write seconds since the view began as `1:23.4`."""
-    minutes, rest = divmod(max(0.0, value), 60)
+    minutes, rest = divmod(round(max(0.0, value), 1), 60)
     return f"{int(minutes)}:{rest:04.1f}"
-
-
-VERBS: dict[of.Action, tuple[str, str]] = {
-    "look": ("looks", "at "),
-    "point": ("points", "at "),
-    "nod": ("nods", "to "),
-    "shake": ("shakes the head", "to "),
-    "speak": ("speaks", "to "),
-    "act": ("moves", ""),
-}
 
 
 def action_words(action: of.Action, targets: Sequence[str], robot: str) -> tuple[str, str]:
@@ -63,7 +45,7 @@ def action_words(action: of.Action, targets: Sequence[str], robot: str) -> tuple
 
     A look without targets is a look away; other actions without targets have no words for them.
     """
-    verb, preposition = VERBS[action]
+    verb, preposition = of.ACTIONS[action]
     if not targets:
         return verb, "away" if action == "look" else ""
     return verb, preposition + " and ".join("the robot" if target == robot else target for target in targets)

@@ -14,6 +14,7 @@ from msgspec import Struct
 from engage_hri.schemas import keys
 from engage_hri.schemas.body_faults import BodyFault, SwitchFaults
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.recognition import SamePeople
 from engage_hri.schemas.requests import Request
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import COVERED_FOR, World
@@ -74,7 +75,7 @@ async def embody(
         )
     async with body.connected() if connects else nullcontext(), asyncio.TaskGroup() as tasks:
         control = _Control(bus, config, body, tasks)
-        with bus.subscribe(*RequestDesk.patterns("control"), keys.WORLD) as inbox:
+        with bus.subscribe(*RequestDesk.patterns("control"), keys.WORLD, keys.SAME_PEOPLE) as inbox:
             bus.answer(keys.ESTIMATE, control.questions.estimate)
             bus.answer(keys.DESCRIBE, control.questions.describe)
             tell_settings(bus, "control", told, config.files, covered_for=covered_for)
@@ -148,7 +149,7 @@ class _Control:
 
     def take(self, received: Received) -> None:
         """Take a message."""
-        if isinstance(received.message, World):
+        if isinstance(received.message, World | SamePeople):
             self._steps.take(input_of(received, received.message), received.number)
             self._timer.set(self._steps.deadline)
         elif (request := self.desk.take(received)) is not None:

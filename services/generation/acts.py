@@ -184,12 +184,13 @@ def _made(tries: Sequence[tuple[Act, Made]], events: Mapping[str, ConnectionEven
     by: Literal["pointing", "look", "words", "nothing"] = (
         "pointing" if pointed else "look" if looked else "words" if phrases else "nothing"
     )
-    decided = [
-        event
-        for _, made in tries
-        if (event := events.get(made.event)) is not None and event.state in DECIDED and by in ("pointing", "look")
-    ]
-    answered = next((event for event in decided if event.state != "failed"), None)
+    answers: dict[str, ConnectionEvent] = {}  # by person
+    for id in [id for _, made in tries for id in made.events if by in ("pointing", "look")]:
+        event = events.get(id)
+        if event is not None and event.state in DECIDED:
+            former = answers.get(event.responder)
+            answers[event.responder] = event if former is None or former.state == "failed" else former
+    all_looked = all(each.state != "failed" for each in answers.values())
     _, last = tries[-1]
     return ReferenceMade(
         reference=last.reference,
@@ -198,8 +199,10 @@ def _made(tries: Sequence[tuple[Act, Made]], events: Mapping[str, ConnectionEven
         phrase=" ".join(
             said(text := made.words if each.complete else each.text, len(text)) for each, made in phrases
         ),
-        looked=answered is not None if decided else None,
-        delay=answered.delay if answered else None,
+        looked=all_looked if answers else None,
+        delay=max((each.delay for each in answers.values() if each.delay is not None), default=None)
+        if all_looked
+        else None,
     )
 
 

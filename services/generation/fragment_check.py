@@ -16,9 +16,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.advice import in_other_letters, meant, suggestion
 from engage_hri.schemas.behaviors import (
     FragmentBehavior,
-    Gaze,
-    GazeShift,
-    HeadDirectionShift,
+    Looks,
     Pointing,
     Reference,
     Speech,
@@ -39,7 +37,7 @@ Kind = Literal["entity", "object", "person"]
 """What may be named somewhere: whatever there is, the robot included; an object; a person."""
 Ids = Mapping[Kind, Mapping[str, str]]
 """Ids, each with what it is, by where they may stand."""
-Aimed = Gaze | GazeShift | HeadDirectionShift | Pointing
+Aimed = Looks | Pointing
 
 
 class Name(NamedTuple):

@@ -177,6 +177,14 @@ class Fragments:
                         performance.hear(message)
             case Utterance() if message.actor != self._robot:
                 self._heard.feed(message, now)
+                self._turns.hear(message, now)
+
+    def rename(self, name: Callable[[str], str]) -> None:
+        """Speak to people by other ids from now on. name: the new one of each."""
+        self._turns.rename(name)
+        self._outcomes.rename(name)
+        for performance in self._live.values():
+            performance.rename(name)
 
     def recognition_gone(self, now: Seconds) -> None:
         """Start the grace after which the open events are lost: recognition may only be cut off."""
@@ -197,9 +205,11 @@ class Fragments:
             return
         # A fragment that has ended is second choice, but it still hears of its events.
         performance = min(named, key=lambda each: each.is_over)
-        performance.feed(progress)
+        performance.feed(progress, self._events.session)
         if performance.signalled_end:
             self._turns.turn_ended(performance.turn.turn, now)
+            if not self._turns.holds_the_turn:
+                self._arbiter.wait_for_answers()
         self._follow_gaze(performance)
 
     def _follow_gaze(self, performance: FragmentPerformance) -> None:

@@ -14,10 +14,8 @@ from engage_hri.schemas.behaviors import (
     Behavior,
     Emit,
     Event,
-    Gaze,
-    GazeShift,
     Hand,
-    HeadDirectionShift,
+    Looks,
     Pointing,
     Reference,
     Speech,
@@ -40,7 +38,7 @@ class Permits(Struct, frozen=True, kw_only=True):
     speech_only: bool = False
 
     def allows(self, behavior: Behavior) -> bool:
-        if isinstance(behavior, Gaze | GazeShift | HeadDirectionShift):
+        if isinstance(behavior, Looks):
             return self.looks
         if isinstance(behavior, Pointing):
             wanted = HANDS if behavior.mode == "BOTH_HANDS" else (behavior.mode,) if behavior.mode else ()
@@ -51,7 +49,7 @@ class Permits(Struct, frozen=True, kw_only=True):
         """True if a behavior under way must be aborted. A point without `mode` may be made by either arm."""
         if isinstance(running, Pointing):
             return not self.allows(running if running.mode else replace(running, mode="BOTH_HANDS"))
-        return isinstance(running, Gaze | GazeShift | HeadDirectionShift) and not self.looks
+        return isinstance(running, Looks) and not self.looks
 
     @property
     def looks(self) -> bool:

@@ -30,7 +30,7 @@ from engage_hri.schemas.fragments import (
 )
 from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions, Utterance
-from engage_hri.schemas.recognition import ConnectionEvent, Floor, Interjection, Statistics, session_of
+from engage_hri.schemas.recognition import ConnectionEvent, Floor, Interjection, SamePeople, Statistics, session_of
 from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused, Unreadable, kind_of
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import COVERED_FOR, CoveredObjects, World
@@ -44,6 +44,7 @@ from engage_hri.services.generation.inhibitions import Leases
 from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports
 from engage_hri.services.reports.in_force import Publisher, WorldReport
 from engage_hri.services.reports.ongoing_actions import GoesOn, TimedReport
+from engage_hri.services.reports.same_people import PeopleNames
 from engage_hri.services.runtime.intake import AnswerRequest, Input, MachineClocks, PublishMessage, TellMistake
 
 WORLD_PATIENCE: Seconds = 5.0
@@ -53,7 +54,7 @@ does. Ours."""
 Told = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | OngoingActions | World | RobotState | Statistics
     | ConnectionEvent | Floor | Interjection | Utterance | SyncPointProgress | WordSpoken | Unreadable | PeerAlive
-    | PeerGone
+    | PeerGone | SamePeople
 )  # fmt: skip
 """Messages that generation takes into account, besides requests."""
 Asked = PerformFragment | Inhibit | SetCondition | Cancel
@@ -89,6 +90,7 @@ class GenerationIntake:
         self._reports = ActionReports(robot, REPORT_GRACE, clock.name, self._instant)
         self._perception = Publisher()
         self._seen = WorldReport(REPORT_GRACE)
+        self._names = PeopleNames()
         self._early: dict[str, PerformFragment] = {}
         """Fragments that wait for a report of the world, or for a person, by request id."""
         self._patience = Silences[str](self._sight)
@@ -124,7 +126,7 @@ class GenerationIntake:
             elif isinstance(message, AnswerCame):
                 self._answer(message, now)
             elif isinstance(message, Asked):
-                self._serve(message, now)
+                self._serve(self._names.named(message), now)
             else:
                 self._observe(message, input, now)
             self._settle(now)
@@ -153,15 +155,21 @@ class GenerationIntake:
         if self._perception.feed(message):
             self._admit_early(now)
         self._tell(self._reports.take(message, input.key, source, life, now, past=input.past))
-        if (seen := self._seen.take(message, source, life, now)) is not None and seen is not message:
+        seen = self._seen.take(message, source, life, now)
+        if isinstance(message, SamePeople) and self._names.take(message):
+            for other, name in ((each.actor, each.name) for each in message.people):
+                self._arbiter.join(other, name)
+            self._fragments.rename(self._names.name)
+        if isinstance(message, World):
+            self._perception.published(source, life)
+        if seen is not None and isinstance(message, World | SamePeople):
+            world = self._objects.see(seen, now)
+            self._fragments.feed(world, now)
+            self._arbiter.feed(world, now)
+            self._admit_early(now)
+        elif seen is not None:
             self._arbiter.feed((self._objects.at(now) if seen.entities else None) or seen, now)
-        match message:
-            case World():
-                self._perception.published(source, life)
-                world = self._objects.see(message, now)
-                self._fragments.feed(world, now)
-                self._arbiter.feed(world, now)
-                self._admit_early(now)
+        match message := self._names.named(message):
             case ConnectionEvent():
                 self._fragments.feed(message, now)
                 if not message.retold:

@@ -1,6 +1,6 @@
 """One fragment from its acceptance to its outcome: what is under way, and which events it still waits for."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Literal
 
 from msgspec import Struct
@@ -11,8 +11,7 @@ from engage_hri.schemas.behaviors import (
     BlockBehavior,
     Event,
     Gaze,
-    GazeShift,
-    HeadDirectionShift,
+    Looks,
     Pointing,
     Speech,
     TurnSignal,
@@ -40,14 +39,13 @@ from engage_hri.services.generation.references.policy import Unreferable
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.outcomes import TurnEvents
 from engage_hri.services.generation.turns.policy import TurnPlan
+from engage_hri.services.reports.same_people import renamed
 from engage_hri.services.text.ear import is_spoken
 
 MOST_TRIES = 5
 """Number of blocks after which the gestures of a reference that is to be chosen again are not tried any more."""
 AWAITED = ("directed_gaze", "mutual_facial_gaze")
 """Events that must be decided before the outcome. An adjacency pair is not: a person's answer may take long."""
-Looks = Gaze | GazeShift | HeadDirectionShift
-"""Behaviors that move the head to look at something."""
 
 
 class Ended(Struct, frozen=True):
@@ -104,8 +102,8 @@ class FragmentPerformance:
         self._running: dict[str, Behavior] = {}
         self._gaze = ""
         """The behavior that holds the head."""
-        self._started: set[str] = set()
-        """Ids of the events that have started and that the outcome waits for."""
+        self._asked: dict[str, str] = {}
+        """Ids of the events that the outcome waits for, each with the session of recognition that was asked."""
         self._closed: set[str] = set()
         """Ids of the behaviors and events that the realizer has ended."""
         self._forbidden: set[str] = set()
@@ -133,8 +131,8 @@ class FragmentPerformance:
         new, self._unpublished = self._unpublished, []
         return new
 
-    def feed(self, progress: SyncPointProgress) -> None:
-        """Take a sync point of this fragment's block."""
+    def feed(self, progress: SyncPointProgress, session: str) -> None:
+        """Take a sync point of this fragment's block. session: of recognition now; empty: none is there."""
         behavior = self._behaviors.get(progress.behavior)
         if behavior is None:
             return
@@ -144,7 +142,7 @@ class FragmentPerformance:
             if isinstance(behavior, Looks):
                 self._gaze = behavior.id
             elif isinstance(behavior, Event) and behavior.kind in AWAITED:
-                self._started.add(behavior.id)
+                self._asked[behavior.id] = session
             elif isinstance(behavior, TurnSignal) and behavior.signal == "ended":
                 self.signalled_end = True
         elif progress.sync == "end":
@@ -179,6 +177,11 @@ class FragmentPerformance:
         """The behavior that holds the head now, if there is one. A shift holds it until the block ends."""
         behavior = self._behaviors.get(self._gaze) if self._ended is None else None
         return behavior if isinstance(behavior, Looks) else None
+
+    def rename(self, name: Callable[[str], str]) -> None:
+        """Speak to people by other ids from now on. name: the new one of each."""
+        self.fragment, self.turn = renamed(self.fragment, name), renamed(self.turn, name)
+        self.left, self.turn_left = renamed(self.left, name), renamed(self.turn_left, name)
 
     def goes_on_with(self, other: "FragmentPerformance") -> bool:
         """True if this is another fragment of the same turn, and its block is on its way or being performed."""
@@ -246,7 +249,8 @@ class FragmentPerformance:
         """
         act, why = self.acts[-1], reasons(outcome)
         act.spoken = outcome.spoken
-        self._started -= {*outcome.dropped, *outcome.interrupted}
+        for id in (*outcome.dropped, *outcome.interrupted):
+            self._asked.pop(id, None)
         rest = rest_of(self.left, self.turn_left, act, outcome) if self._may_go_on(outcome, why) else None
         # What fell with another behavior is not worth a word: that one is named.
         fallen = {each.id for each in act.plan.block.behaviors if {*each.needs} & {*why, *outcome.interrupted}}
@@ -314,7 +318,7 @@ class FragmentPerformance:
         """The outcome; None until the block has ended and its directed and facial gazes are decided, or it is due."""
         if self._ended is None:
             return None
-        undecided = [id for id in sorted(self._started) if not self._decided(id, events)]
+        undecided = [id for id, session in self._asked.items() if not self._decided(id, session, events)]
         if undecided and not is_due:
             return None
         mine = [event for event in events.of_turn(self.turn.turn) if event.block == self.fragment.id]
@@ -338,9 +342,14 @@ class FragmentPerformance:
             fault=self._ended.fault,
         )
 
-    def _decided(self, behavior: str, events: TurnEvents) -> bool:
+    def _decided(self, behavior: str, session: str, events: TurnEvents) -> bool:
+        """True if nothing more will be told of an event. session: of recognition when it was asked for it.
+
+        What had not started when recognition died never will: its next life knows nothing of it.
+        """
         event = events.last_begun_by(self.fragment.id, behavior)
-        return behavior in self._closed if event is None else event.state != "started"
+        has_died = session not in ("", events.session)
+        return behavior in self._closed or has_died if event is None else event.state != "started"
 
 
 class GazesOfFragments:

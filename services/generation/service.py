@@ -44,7 +44,7 @@ Ours."""
 PATTERNS = (
     *RequestDesk.patterns(NAME), keys.ANY_REQUEST_STATE, keys.FEEDBACK, keys.ANY_CONNECTION_EVENT, keys.WORLD,
     keys.SYNC_POINT, keys.ANY_ACTION, keys.ANY_PERCEIVED_ONGOING, keys.UTTERANCE, keys.ROBOT_STATE,
-    keys.ANY_STATISTICS, keys.ANY_INTERJECTION, keys.FLOOR,
+    keys.ANY_STATISTICS, keys.ANY_INTERJECTION, keys.FLOOR, keys.SAME_PEOPLE,
 )  # fmt: skip
 
 

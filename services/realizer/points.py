@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple, TypeVar
 from msgspec import Struct
 
 from engage_hri.schemas.behavior_types import TYPES, Performer, sync_points, types_with
-from engage_hri.schemas.behaviors import Behavior, Event, Speech, Wait
+from engage_hri.schemas.behaviors import EVENT_KINDS, Behavior, Event, Speech, Wait
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
@@ -85,10 +85,6 @@ SHIFTS = types_with(turns_base=True)
 
 NOMINAL_PER_CHARACTER: Seconds = 0.07
 GUESSED_SHORTEST: Seconds = 0.01
-NOMINAL_DELAY: dict[str, Seconds] = {
-    "directed_gaze": 0.3, "mutual_facial_gaze": 0.7, "adjacency_pair": 0.4, "backchannel": 0.0,
-}  # fmt: skip
-"""Mean delays of Table 2.1: the expected seconds until the decision of an event."""
 
 
 class Segment(NamedTuple):
@@ -168,5 +164,5 @@ def _nominal(behavior: Behavior, points: tuple[str, ...]) -> tuple[Seconds, ...]
         case Wait(duration=duration):
             return (duration or 0.0,)
         case Event(kind=kind):
-            return (NOMINAL_DELAY[kind],)
+            return (EVENT_KINDS[kind].delay,)
     return TYPES[type_name(behavior)].nominal

@@ -1,7 +1,7 @@
 """Recognition: which connection events begin, succeed, fail and end between the robot and each person.
 
 `events` has pure state machines with transition tables as data (`directed_gaze`, `mutual_facial_gaze`,
-`adjacency_pair`, `backchannel`), one set for each person of a `session`. `perceive` makes actions of raw perception,
-`statistics` counts the events, `recognizer` joins the three, `service` connects them to the bus. Theory: thesis
-chapter 2.
+`adjacency_pair`, `backchannel`), one set for each person of a `session`; `kinds` says what a new one is told.
+`perceive` makes actions of raw perception, `statistics` counts the events, `recognizer` joins the three, `service`
+connects them to the bus. Theory: thesis chapter 2.
 """

@@ -9,9 +9,9 @@ from pathlib import Path
 import msgspec
 
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.recognition import OpenEvents, Statistics
+from engage_hri.schemas.recognition import OpenEvents, SamePeople, Statistics
 
-State = Statistics | OpenEvents
+State = Statistics | OpenEvents | SamePeople
 
 
 class FormerLife:
@@ -23,11 +23,14 @@ class FormerLife:
         """States as they are in the file, by key."""
 
     def recall(self) -> list[State]:
-        """Read what a former life has kept, the counts first. Raises OSError or `msgspec.DecodeError`."""
+        """Read what a former life has kept, the counts first, the open pairs last.
+
+        Raises OSError or `msgspec.DecodeError`.
+        """
         if self._path is None or not self._path.exists():
             return []
         states = [msgspec.json.decode(line, type=State) for line in self._path.read_bytes().splitlines()]
-        return sorted(states, key=lambda state: isinstance(state, OpenEvents))
+        return sorted(states, key=lambda state: (Statistics, SamePeople, OpenEvents).index(type(state)))
 
     def keep(self, key: str, message: Message) -> None:
         """Keep a state in place of the one before; other messages are not kept."""

@@ -31,6 +31,7 @@ from engage_hri.schemas.perception import (
     VoiceActivity,
 )
 from engage_hri.schemas.recognition import (
+    ENDINGS,
     ConnectionEvent,
     EventOutcome,
     Floor,
@@ -38,6 +39,7 @@ from engage_hri.schemas.recognition import (
     Interjection,
     OpenEvents,
     RequestEvent,
+    SamePeople,
     SignalTurn,
     Statistics,
     TurnOutcome,
@@ -53,12 +55,13 @@ from engage_hri.services.recognition.events.open_events import OpenEventTracker
 from engage_hri.services.recognition.events.scene import Worded
 from engage_hri.services.recognition.perceive.clock_errors import ClockErrors
 from engage_hri.services.recognition.perceive.clock_restarts import ClockRestarts
-from engage_hri.services.recognition.perceive.identities import AnyStruct, Identities, Join
+from engage_hri.services.recognition.perceive.identities import Identities, Join, Parting
 from engage_hri.services.recognition.perceive.words import TimedWords
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from engage_hri.services.reports.action_reports import OLDEST, REPORT_GRACE, ActionReports, Read
 from engage_hri.services.reports.ongoing_actions import GoesOn, TimedReport
+from engage_hri.services.reports.same_people import AnyStruct, renamed
 from engage_hri.services.runtime.intake import (
     AnswerRequest,
     Input,
@@ -71,9 +74,9 @@ from engage_hri.services.runtime.intake import (
 Content = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | OngoingActions | World | RobotState | HeadOwner
     | SyncPointProgress | BlockProgress | HeadPose | VoiceActivity | Utterance | RequestEvent | SignalTurn | Cancel
-    | PeerAlive | PeerGone | Statistics | OpenEvents
+    | PeerAlive | PeerGone | Statistics | OpenEvents | SamePeople
 )  # fmt: skip
-"""Messages that recognition takes into account; the last two are those of its former life, and come by no bus."""
+"""Messages that recognition takes into account; the last three are those of its former life, and come by no bus."""
 _CONTENT = get_args(Content)
 _News = ActionBegan | ActionEnded | ActorFound | ActorLost | HeadPose | VoiceActivity | Utterance
 """Messages that tell of what has just happened."""
@@ -124,8 +127,11 @@ class Intake:
         return min((at for at in times if at is not None), default=None)
 
     def begin(self, now: Seconds) -> list[Output]:
-        """Statistics of all, so that those who ask before the first event get an answer."""
-        return [PublishMessage(keys.statistics("all"), self._statistics.overall(now))]
+        """Statistics of all, so that those who ask before the first event get an answer, and who is the same."""
+        self._now = now
+        self._outputs.append(PublishMessage(keys.statistics("all"), self._statistics.overall(now)))
+        self._tell_same()
+        return self._take()
 
     def advance(self, now: Seconds) -> list[Output]:
         """Take all steps that are due by now."""
@@ -140,7 +146,7 @@ class Intake:
         message = input.message
         if isinstance(message, Cancel):
             self._feed(message, now)
-        elif isinstance(message, Statistics | OpenEvents):
+        elif isinstance(message, Statistics | OpenEvents | SamePeople):
             if not input.key:
                 self._resume(message, now)
         elif self._is_credible(input):
@@ -157,9 +163,15 @@ class Intake:
                 self._feed(message, self._when(message, input.at))
         return self._take()
 
-    def _resume(self, state: Statistics | OpenEvents, now: Seconds) -> None:
+    def _resume(self, state: Statistics | OpenEvents | SamePeople, now: Seconds) -> None:
         """Go on from a state of a former life that was told on this clock, not long ago."""
-        if state.at.clock != self._clock.name or not now - FORGOTTEN_AFTER < state.at.seconds <= now:
+        if state.at.clock != self._clock.name or state.at.seconds > now:
+            return
+        if isinstance(state, SamePeople):  # the last change of it may be long ago: that life went on
+            if max(self._former_until, state.at.seconds) > now - FORGOTTEN_AFTER:
+                self._identities.resume(state.people)
+            return
+        if state.at.seconds <= now - FORGOTTEN_AFTER:
             return
         self._former_until = max(self._former_until, state.at.seconds)
         if isinstance(state, Statistics):
@@ -180,8 +192,12 @@ class Intake:
         at: time at which the message came.
         """
         if isinstance(message, ActorFound | ActorLost | HeadPose | World):
-            for join in self._identities.take(message, self._when(message, at)):
-                self._join(join)
+            for change in self._identities.take(message, self._when(message, at)):
+                if isinstance(change, Join):
+                    self._join(change)
+                else:
+                    self._part(change)
+                self._tell_same()
         return self._identities.inward(message)
 
     def _join(self, join: Join) -> None:
@@ -203,6 +219,24 @@ class Intake:
             self._note(self._recognizer.join(other, kept, now))
             for each in going:
                 self._feed(each, now)
+
+    def _part(self, parting: Parting) -> None:
+        """Take a person for another than was guessed. What is open with them is told as theirs from now on."""
+        at, actor = Stamp(self._clock.name, self._now), parting.id
+        if actor == parting.name:
+            return  # recognition knows whose id it was by that person's own
+        for id, before in tuple(self._told.items()):
+            if before.person(self._robot) == parting.name and before.state not in ENDINGS:
+                told = renamed(before, lambda each: actor if each == parting.name else each)
+                event = self._told[id] = replace(told, at=at, retold=True)
+                self._outputs.append(PublishMessage(keys.connection_event(actor, event.kind), event))
+        for message in self._open_events.join(parting.name, actor, at):
+            self._outputs.append(PublishMessage(keys.open_events(message.actor), message))
+
+    def _tell_same(self) -> None:
+        """Tell which ids are one person."""
+        same = SamePeople(at=Stamp(self._clock.name, self._now), people=self._identities.others())
+        self._outputs.append(PublishMessage(keys.SAME_PEOPLE, same))
 
     def _tell_again(self, names: set[str], name: str) -> None:
         """Tell what was told of a person by other names by this one, as far as it is remembered."""
@@ -342,7 +376,8 @@ class Intake:
                     self._reports.forget(actor)
                     if not self._identities.is_other(actor):
                         changes.append(PersonForgotten(self._identities.name(actor)))
-                        self._identities.forget(actor)
+                        if self._identities.forget(actor):
+                            self._tell_same()
                 case Mishap(actor=actor, error=error):
                     out.append(TellMistake(error, f"what {actor or 'somebody'} does", request))
         self._tell_floor()

@@ -24,9 +24,9 @@ from engage_hri.services.recognition.events.machine import Effect, Mishap, Perso
 from engage_hri.services.recognition.events.scene import Covered
 from engage_hri.services.recognition.events.session import SETTLING, Observation, Session
 from engage_hri.services.recognition.perceive.attention import Attention
-from engage_hri.services.recognition.perceive.identities import renamed
 from engage_hri.services.recognition.perceive.words import TimedWords, Words
 from engage_hri.services.reports.ongoing_actions import GoesOn
+from engage_hri.services.reports.same_people import renamed
 
 OLDEST: Seconds = 0.5
 """Greatest age at which a head pose or a voice level that arrives still counts: an older one tells of what has been

@@ -22,8 +22,10 @@ from msgspec.structs import replace
 from engage_hri.schemas import keys
 from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, OngoingActions
+from engage_hri.schemas.recognition import SamePeople
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.reports.ongoing_actions import MOST, ActionEvent, GoesOn, Report, TimedReport
+from engage_hri.services.reports.same_people import PeopleNames
 
 OLDEST: Seconds = 60.0
 """Age from which on a stamp is not believed: an older event would stay for ever in the windows of the statistics."""
@@ -93,7 +95,7 @@ REPORT_GRACE: Seconds = 4.0
 """Time for which what a reporter said holds after it has vanished, where no configuration says otherwise."""
 STRANGERS_KEPT = 256
 """Number of programs of others whose name as a reporter is remembered."""
-Read = ActionEvent | OngoingActions | PeerAlive | PeerGone
+Read = ActionEvent | OngoingActions | PeerAlive | PeerGone | SamePeople
 """Messages of which it takes notice."""
 
 
@@ -112,6 +114,7 @@ class ActionReports:
         self._reporters: dict[str, _Reporter] = {}
         self._strangers: OrderedDict[str, str] = OrderedDict()
         """Names of reporters whose messages name no participant, by their life."""
+        self._names = PeopleNames()
 
     def take(
         self, message: object, key: str, source: str, life: str, now: Seconds, *, past: bool = False
@@ -120,9 +123,28 @@ class ActionReports:
         told = self.advance(now)
         if isinstance(message, PeerAlive | PeerGone):
             return told + self.feed(message, now)
+        if isinstance(message, SamePeople):
+            return told + self._take_same(message, now)
         if isinstance(message, ActionEvent | OngoingActions) and is_proper(message, key, source, self._robot):
             name, of = self._named(key, source, life)
-            return told + self.hear(message, name, of, now, past=past)
+            return told + self.hear(self._names.named(message), name, of, now, past=past)
+        return told
+
+    def _take_same(self, message: SamePeople, now: Seconds) -> list[TimedReport]:
+        """Take news of who is one person: one of the two is lost, and what this one does goes on with the other."""
+        told: list[TimedReport] = []
+        if not self._names.take(message):
+            return told
+        at = Stamp(self._clock, now)
+        for other, name in ((each.actor, each.name) for each in message.people):
+            known = [one.reports[other] for one in self._reporters.values() if other in one.reports]
+            is_known = any(name in one.reports for one in self._reporters.values())
+            going = self.join(other, name)
+            if known:
+                told.append(TimedReport(ActorLost(actor=other, at=at), now, is_sure=False))
+                if any(report.seen for report in known) and not is_known:
+                    told.append(TimedReport(ActorFound(actor=name, at=at), now, is_sure=False))
+            told += [TimedReport(each, now) for each in going]
         return told
 
     def _named(self, key: str, source: str, life: str) -> tuple[str, str]:

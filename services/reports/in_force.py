@@ -14,6 +14,7 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
+from engage_hri.services.reports.same_people import PeopleNames
 
 
 class Publisher:
@@ -49,6 +50,7 @@ NOTHING = World(entities=())
 class WorldReport:
     """The last report of the world. grace: time for which it holds after its publisher has gone.
 
+    Each person is in it once, by the id by which recognition tells of them (`same_people.py`).
     What is taken and what passes return the world that there is from now on, or None: it is as it was.
     """
 
@@ -56,6 +58,8 @@ class WorldReport:
         self._grace = grace
         self._publisher = Publisher()
         self._last: World | None = None
+        """As it was published."""
+        self._names = PeopleNames()
         self._over_at: Seconds | None = None
         self._is_over = False
 
@@ -70,14 +74,20 @@ class WorldReport:
         if isinstance(message, World):
             self._publisher.published(source, life)
             self._last, self._over_at, self._is_over = message, None, False
-            return message
+            return self._names.named(message)
+        if self._names.take(message):
+            return None if self._is_over else self._named_last
         was_there = self._publisher.is_there
         if self._publisher.feed(message):  # type: ignore[arg-type]  # any other message tells it nothing
             was_over, self._is_over, self._over_at = self._is_over, False, None
-            return self._last if was_over else world
+            return self._named_last if was_over else world
         if was_there and not self._publisher.is_there and isinstance(message, PeerGone):
             self._over_at = now + self._grace
         return world
+
+    @property
+    def _named_last(self) -> World | None:
+        return None if self._last is None else self._names.named(self._last)
 
     def advance(self, now: Seconds) -> World | None:
         """Let time pass."""

@@ -9,9 +9,9 @@ from collections.abc import Callable, Mapping, Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.behaviors import EVENT_KINDS, EventKind
 from engage_hri.services.study.records import EventRecord, SessionRecord
-from engage_hri.services.study.summary import KINDS, RESPONDED, by_condition, pooled
+from engage_hri.services.study.summary import RESPONDED, by_condition, pooled
 
 COLORS = ("#0072B2", "#E69F00", "#009E73")
 HATCHES = ("", "//", "..")
@@ -49,7 +49,7 @@ def _events(groups: Groups) -> Figure:
         return height, f"{height:.1f}"
 
     figure, axes = _one_panel()
-    _bars(axes, groups, KINDS, mean)
+    _bars(axes, groups, tuple(EVENT_KINDS), mean)
     axes.set_ylabel("connection events per session")
     return figure
 
@@ -82,7 +82,7 @@ def _delays(groups: Groups, events: Sequence[EventRecord]) -> Figure:
         ]
         _boxes(axes, groups, samples, whiskers=(5, 95))
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-        axes.set_title(kind.replace("_", " "), fontsize=10)
+        axes.set_title(EVENT_KINDS[kind].title, fontsize=10)
     figure.axes[0].set_ylabel("delay of those that succeeded (s)")
     figure.supxlabel("box: quartiles and median; whiskers: 5th and 95th percentile", fontsize=8)
     return figure
@@ -134,7 +134,7 @@ def _bars(axes: Axes, groups: Groups, kinds: Sequence[EventKind], height: Height
             color=COLORS[index % len(COLORS)], hatch=HATCHES[index % len(HATCHES)], edgecolor="white",
         )  # fmt: skip
         axes.bar_label(bars, words, fontsize=7, padding=1)
-    axes.set_xticks(range(len(kinds)), [kind.replace("_", " ") for kind in kinds])
+    axes.set_xticks(range(len(kinds)), [EVENT_KINDS[kind].title for kind in kinds])
     if groups:
         # Above the bars: any of them may be as high as the axes.
         axes.legend(frameon=False, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(groups))

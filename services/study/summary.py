@@ -5,19 +5,17 @@ import io
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from statistics import mean, stdev
-from typing import get_args
 
 import msgspec
 from msgspec import Struct
 
-from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.behaviors import EVENT_KINDS, EventKind
 from engage_hri.schemas.recognition import KindStatistics
 from engage_hri.services.study.hypotheses import CAVEAT, HYPOTHESES, PEOPLE_CAVEAT, HypothesisResult
 from engage_hri.services.study.records import EventRecord, SessionRecord
 
-KINDS: tuple[EventKind, ...] = get_args(EventKind)
-RESPONDED = tuple(kind for kind in KINDS if kind != "backchannel")
-"""Kinds with a responder; a backchannel can neither fail nor be late."""
+RESPONDED = tuple(kind for kind, each in EVENT_KINDS.items() if each.is_answered)
+"""Kinds with a responder; the others can neither fail nor be late."""
 MISSING = "-"
 
 
@@ -86,9 +84,9 @@ def overview(records: Sequence[SessionRecord], ordered: Mapping[str, int] | None
     for title, digits, measure in _MEASURES:
         cells = (mean_and_deviation(known(map(measure, group)), digits) for group in groups.values())
         rows.append((title, *cells))
-    for kind in KINDS:
+    for kind, words in EVENT_KINDS.items():
         counts = ([float(record.of(kind).count) for record in group] for group in groups.values())
-        rows.append((kind.replace("_", " "), *(mean_and_deviation(count, 1) for count in counts)))
+        rows.append((words.title, *(mean_and_deviation(count, 1) for count in counts)))
         if kind in RESPONDED:
             all_of = [pooled(group, kind) for group in groups.values()]
             rows.append(("- failure rate", *(number(one.failure_rate, 3) for one in all_of)))
@@ -220,7 +218,7 @@ KIND_COLUMNS = ("count", "succeeded", "failed", "failure_rate", "delay_mean", "f
 SESSION_COLUMNS = (
     "session", "condition", "seed", "finished", "reason", "duration", "completion_time", "events", "mtbce", "max_gap",
     "adjacency_pairs_every", "eye_contact_first", "eye_contact_second", "eye_contact_last",
-    *(f"{kind}_{column}" for kind in KINDS for column in KIND_COLUMNS),
+    *(f"{kind}_{column}" for kind in EVENT_KINDS for column in KIND_COLUMNS),
 )  # fmt: skip
 
 Cell = str | int | float | bool | None
@@ -244,7 +242,7 @@ def _session(record: SessionRecord) -> list[Cell]:
         record.session, record.condition, record.seed, record.finished, record.reason, record.duration,
         record.completion_time, numbers.events, numbers.mtbce, numbers.max_gap, record.adjacency_pairs_every,
         *((eyes.first, eyes.second, eyes.last) if eyes else (None, None, None)),
-        *(getattr(record.of(kind), column) for kind in KINDS for column in KIND_COLUMNS),
+        *(getattr(record.of(kind), column) for kind in EVENT_KINDS for column in KIND_COLUMNS),
     ]  # fmt: skip
 
 

@@ -373,3 +373,18 @@ async def test_keys_of_another_role_are_refused_before_anything_is_told(
     with pytest.raises(InputRefused, match=r"role manager; what people do is told by perception or wizard"):
         async with perceive("ann", keys=str(tmp_path / "keys" / "alice")):
             pass
+
+
+async def test_a_person_says_who_it_is_the_same_as(hub: MemoryHub) -> None:
+    async with running(hub, {"recognition": idle}):
+        with hub.join("reader").subscribe(keys.PERCEIVED_ACTION) as told:
+            async with perceive("face_3", hub=hub) as face:
+                face.same_as("ann")
+                for wrong in ("", "a/b", "face_3", face.robot):
+                    with pytest.raises(InputRefused):
+                        face.same_as(wrong)
+            found = [(await told.next()).message for _ in range(len(told))]
+
+    assert [(each.actor, each.same_as) for each in found if isinstance(each, ActorFound)] == [
+        ("face_3", ""), ("face_3", "ann"),
+    ]  # fmt: skip

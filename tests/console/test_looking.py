@@ -16,7 +16,9 @@ WORLD = World(entities=(ANN, HAND, PIECE))
     ("kind", "target", "reason", "does", "why"),
     [
         ("none", "", "nobody has been seen", "look straight ahead", "it has not seen anybody yet"),
-        ("face", "ann", "spoken to last", "look at ann", "it spoke to this person last"),
+        ("face", "ann", "spoken with last", "look at ann", "it spoke with this person last"),
+        ("face", "ann", "is to answer: others are, too", "look at ann",
+         "an answer of this person or another is awaited"),
         ("face", "ann", "nearest when it came", "look at ann", "nobody else was nearer"),
         ("face", "", "lost: hold the direction", "keep its head where it is", "the person there has gone"),
         ("hands", "ann-hand", "moves", "look at a hand of ann", "this hand is moving"),

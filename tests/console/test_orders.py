@@ -105,11 +105,13 @@ def test_the_log_has_what_was_ordered_but_not_the_words() -> None:
 
 
 def test_words_and_a_reference_are_a_turn_that_engage_can_read() -> None:
-    asked = json_codec_fragment(told([Say(say="Could you hand me")], "cup", asks=True, addressee="ann"))
-    said = json_codec_fragment(told([Say(say="Thanks.")], "", asks=False, addressee=""))
+    order = Tell(target="cup", asks=True, addressee=("ann", "bob"), interruptible=False)
+    asked = json_codec_fragment(told(order, [Say(say="Could you hand me")]))
+    said = json_codec_fragment(told(Tell(), [Say(say="Thanks.")]))
 
     assert [type(each) for each in asked.behaviors] == [Speech, Reference]
-    assert (asked.turn_index, asked.addressee, said.turn_index) == (1, "ann", 3)
+    assert (asked.turn_index, asked.addressee, asked.interruptible) == (1, ("ann", "bob"), False)
+    assert (said.turn_index, said.addressees, said.interruptible, said.interruptible_after) == (3, (), None, None)
     assert json_codec_fragment(backchannel("uh-huh")).turn_status == "backchannel"
 
 
@@ -123,10 +125,10 @@ def json_codec_fragment(value: dict[str, object]) -> TurnFragment:
 
 def test_a_prepared_fragment_is_for_whom_it_names_or_else_for_whom_the_wizard_has_chosen() -> None:
     made = Script((TurnFragment(id="a", addressee="ann"), TurnFragment(id="b")))
-    taken = [made.take(0, "kim"), made.take(1, "kim"), made.take(1)]
+    taken = [made.take(0, ("kim",)), made.take(1, ("kim", "lee")), made.take(1)]
 
-    assert [isinstance(each, TurnFragment) and each.addressee for each in taken] == ["ann", "kim", ""]
-    assert backchannel("nod", "kim")["addressee"] == "kim"
+    assert [isinstance(each, TurnFragment) and each.addressees for each in taken] == [("ann",), ("kim", "lee"), ()]
+    assert backchannel("nod", ("kim",))["addressee"] == ("kim",)
 
 
 def test_each_performance_of_the_script_has_an_id_of_its_own() -> None:

@@ -31,6 +31,7 @@ const send = WebSocket.prototype.send;
 WebSocket.prototype.send = function (text) {
   const said = JSON.parse(text);
   window.sent.push(said.order?.do ?? said.do);
+  if (said.order) window.ordered = said.order;
   return send.call(this, text);
 };
 """
@@ -133,6 +134,27 @@ async def test_who_speaks_to_whom_is_told_with_what_a_speech_into_the_turn_was_t
         told = "document.querySelector('#floor canvas').getAttribute('aria-label')"
         await page.until(f"{told}?.includes('robot to ann, ann takes the floor: “wait”. ann is engaging.')")
         assert page.errors == []
+
+
+async def test_several_are_spoken_to_and_nobody_may_interrupt(place: Place) -> None:
+    async with opened(place) as page:
+        await page.until("window.engage.state.scene?.above")
+        people = [{"id": id, "at": [1.3, y, 1.2], "present": True, "looks": [], "points": [], "acts": [], "nods": "",
+                   "speaks": False} for id, y in (("ann", 0.4), ("bob", 0.0), ("cy", -0.4))]  # fmt: skip
+        scene = await page.value("window.engage.state.scene")
+        await take(page, sections={"health": services(), "scene": {**scene, "people": people}})
+        await page.value(SENT)
+        for id in ("cy", "ann"):
+            await page.value(f"document.querySelector('#wizard-to-{id}').click()")
+        await page.value("document.querySelector('#wizard-who').value = 'false'")
+        await page.value("document.querySelector('#wizard-tell').value = 'Mind the step.'")
+        await page.value("document.querySelector('#wizard form').requestSubmit()")
+
+        order = await page.value("window.ordered")
+        assert (order["addressee"], order["interruptible"], order["interruptible_after"]) == (["ann", "cy"], False, 0)
+
+        await take(page, sections={"scene": {**scene, "people": people[:2]}})
+        assert await page.value("[...document.querySelectorAll('#wizard-to-ann:checked')].length") == 1
 
 
 async def test_two_references_of_one_name_are_both_listed(place: Place) -> None:

@@ -157,14 +157,14 @@ def test_words_come_as_they_are_said_with_those_of_people_at_their_speech() -> N
 
 def test_the_owner_of_the_head_has_its_reason_and_those_who_wait_have_theirs() -> None:
     owner = Claim(kind="fragment", priority=2, target="blue", reason="ref-2")
-    waits = Claim(kind="face", priority=6, target="ann", reason="spoken to last")
+    waits = Claim(kind="face", priority=6, target="ann", reason="spoken with last")
     made = picture((HeadOwner(owner=owner, since=at(12.5), waiting=(waits,)), 12.5))
 
     head = section(made, "head")
 
     assert (head["since"], head["owner"]["reason"]) == (2.5, "ref-2")
     assert (head["owner"]["does"], head["owner"]["why"]) == ("look at blue", "this belongs to what it is saying")
-    assert [(each["target"], each["why"]) for each in head["waiting"]] == [("ann", "it spoke to this person last")]
+    assert [(each["target"], each["why"]) for each in head["waiting"]] == [("ann", "it spoke with this person last")]
 
 
 def test_speeches_overlap_and_say_for_whom_they_are_and_what_those_into_the_turn_were_taken_for() -> None:

@@ -19,6 +19,7 @@ THEIRS = {
     "pan_tilt.py",
     "pan_tilt_sdk.py",
     "reachy.py",
+    "services/recognition/events/shared_laughter.py",
 }
 """Files of whoever reads."""
 

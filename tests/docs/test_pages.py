@@ -55,6 +55,8 @@ ELSEWHERE = {
     ("docs/control.md", "python"): "tests/control/test_docs.py",
     ("docs/contract.md", "python"): "tests/control/test_docs.py",
     ("docs/recognition.md", "mermaid"): "tests/recognition/test_tables.py",
+    ("docs/recognition.md", "python"): "tests/recognition/test_new_kind.py",
+    ("docs/recognition.md", "diff"): "tests/recognition/test_new_kind.py",
     ("docs/bus.md", "mermaid"): "tests/requests/test_request_model.py",
     ("docs/reachy-mini.md", "sh"): "tests/control/reachy_mini/test_docs.py",
     ("docs/people.md", "python"): "tests/client/test_people_page.py",

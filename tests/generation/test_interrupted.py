@@ -12,6 +12,7 @@ from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.summary import summary
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.generation.turns.interjections import WORDLESS
 from tests.generation.test_talked_into import call, robot
 from tests.random_cases import share_of
 from tests.recognition.phrases import PHRASES
@@ -94,13 +95,17 @@ async def test_each_outcome_says_who_and_what_and_each_word_is_said_once(hub: Me
     if not known and is_noise:
         readings |= {"backchannel"}
     if not known and seconds >= limit - ROUND:  # its length decides, before its words are known
-        readings = {"interruption"} if seconds > limit + ROUND else {*readings, "interruption"}
+        readings |= {"interruption"}
     assert into.reading in readings
     if known or not into.went_on:
         assert into.words in (phrase.words, "")
     if known and not is_noise:
         assert into.words == phrase.words
-    assert into.went_on == (into.reading != "interruption")
+    if into.reading == "interruption" and not known and seconds + RECOGNIZING >= WORDLESS - ROUND:
+        pass  # its words come in the instant in which the robot goes on without
+    else:
+        # A voice without words is too short to take the floor, whatever its length says of the event.
+        assert into.went_on == (into.reading != "interruption" or not phrase.stops)
     assert told.status == ("done" if into.went_on else "interrupted")
     assert (spoken == all_words) == into.went_on
     if known and phrase.stops:

@@ -14,7 +14,7 @@ from engage_hri.schemas.recognition import Interjection, InterjectionReading
 from engage_hri.schemas.summary import Summary, summary
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.generation.turns.interjections import UNDECIDED
+from engage_hri.services.generation.turns.interjections import UNDECIDED, WORDLESS
 from engage_hri.services.generation.turns.policy import TurnPolicy
 from tests.generation.test_talked_into import LONG, call, robot
 from tests.generation.test_turn_policy import fragment
@@ -23,8 +23,9 @@ PEOPLE = ("ann", "bob", "cy")
 """The robot speaks to the first two."""
 
 
-def news(who: str, reading: InterjectionReading, since: float) -> Interjection:
-    return Interjection(actor=who, since=Stamp("test", since), at=Stamp("test", since), reading=reading)
+def news(who: str, reading: InterjectionReading, since: float, words: str = "") -> Interjection:
+    at = Stamp("test", since)
+    return Interjection(actor=who, since=at, at=at, reading=reading, words=words)
 
 
 def speaking(**fields: object) -> TurnPolicy:
@@ -38,13 +39,17 @@ def speaking(**fields: object) -> TurnPolicy:
 
 
 class Said(NamedTuple):
-    """A speech. decided: seconds from its beginning to its reading; None: nobody tells one."""
+    """A speech. decided: seconds from its beginning to its reading; None: nobody tells one.
+
+    words: those of an interruption; "": its length has decided it.
+    """
 
     who: str
     since: float
     lasts: float
     reading: InterjectionReading
     decided: float | None
+    words: str = "wait"
 
 
 def expected(said: Said, named: object, after: float) -> tuple[float | None, float, float]:
@@ -55,6 +60,11 @@ def expected(said: Said, named: object, after: float) -> tuple[float | None, flo
     known = None if said.decided is None else said.since + said.decided
     if not is_heeded:
         return None, 0.0, 0.0
+    if said.reading == "interruption" and known is not None and not said.words and known < said.since + WORDLESS:
+        heeded, floor = max(known, counts), said.since + WORDLESS
+        if heeded >= floor:
+            return heeded, 0.0, 0.0
+        return (floor if said.lasts > WORDLESS else None), counts, floor
     if known is not None and known <= counts:
         return (counts if said.reading == "interruption" else None), 0.0, 0.0
     gives_up = counts + UNDECIDED
@@ -70,7 +80,8 @@ def test_a_speech_breaks_the_turn_off_only_if_it_may_and_lasts(seed: int) -> Non
     after = chance.choice((0.0, 0.0, 0.5, 1.3))
     reading = chance.choice(("interruption", "backchannel", "noise", "other", "answer"))
     decided = chance.choice((None, round(chance.uniform(0.1, 2.5), 2)))
-    said = Said(chance.choice(PEOPLE), 1.0, round(chance.uniform(0.1, 3.0), 2), reading, decided)  # type: ignore[arg-type]
+    words = chance.choice(("", "wait"))
+    said = Said(chance.choice(PEOPLE), 1.0, round(chance.uniform(0.1, 3.0), 2), reading, decided, words)  # type: ignore[arg-type]
     broken_off, held_from, held_until = expected(said, named_ids, after)
 
     turns = speaking(interruptible=named, interruptible_after=after)
@@ -83,7 +94,7 @@ def test_a_speech_breaks_the_turn_off_only_if_it_may_and_lasts(seed: int) -> Non
         if what == 0:
             turns.interjections.falls_silent(said.who)
         elif what < 3:
-            turns.interject(news(said.who, "open" if what == 1 else reading, said.since), at)
+            turns.interject(news(said.who, "open" if what == 1 else reading, said.since, said.words), at)
         elif ended is None:
             if turns.tick(at) is not None:
                 ended = at

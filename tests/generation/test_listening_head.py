@@ -110,6 +110,64 @@ def test_while_it_waits_for_an_answer_the_talk_of_others_does_not_draw_it() -> N
     assert looks(stage) == [(14.0, "ben")]
 
 
+def test_who_speaks_to_the_robot_has_its_eyes_and_not_who_talks_on_or_looks_at_it() -> None:
+    stage = company()
+    stage.feed(Floor(at=AT, speeches=(FloorSpeech(actor="ben", since=AT, to=("cem",)),)))
+    stage.until(12.0)
+    answers = FloorSpeech(actor="ann", since=AT, to=("robot",))
+    stage.feed(Floor(at=AT, speeches=(FloorSpeech(actor="ben", since=AT, to=("cem",)), answers)))
+    stage.until(13.0)
+    facial = {"kind": "mutual_facial_gaze", "initiator": "cem", "objects": ()}
+    stage.feed(event("look", "started", **facial))
+    stage.until(15.0)
+    assert looks(stage) == [(10.6, "ben"), (12.3, "ann")]
+
+    stage.feed(event("point", "started", initiator="cem", objects=("cup",)))
+    assert looks(stage)[2:] == [(15.0, "cup")], "what somebody points at may be what is spoken of"
+    stage.feed(event("point", "failed", initiator="cem", objects=("cup",)))
+    stage.feed(Floor(at=AT, speeches=()))
+    stage.until(15.5)
+    assert looks(stage)[3:] == [(15.0, "ann"), (15.0, "cem")]
+
+
+def asked_all(stage: Stage, state: str, **fields: object) -> None:
+    for who in ("ann", "ben", "cem"):
+        told = event(who, state, kind="adjacency_pair", initiator="robot", responder=who, objects=(), **fields)
+        stage.arbiter.feed(told, stage.now)
+    stage.rule()
+
+
+def test_while_several_are_to_answer_it_looks_from_one_to_the_next_until_one_speaks_and_stays_with_that_one() -> None:
+    stage = company()
+    asked_all(stage, "started")
+    stage.until(14.0)
+    assert looks(stage) == [], "the robot still speaks"
+
+    stage.do(lambda arbiter: arbiter.wait_for_answers())
+    stage.until(18.0)
+    assert looks(stage) == [(14.0, "ben"), (15.2, "cem"), (16.4, "ann"), (17.6, "ben")]
+
+    speak(stage, 18.0, "cem")
+    asked_all(stage, "succeeded", answered_by="cem")
+    speak(stage, 20.0)
+    stage.until(30.0)
+    assert looks(stage)[4:] == [(18.0, "cem")]
+
+
+def test_who_has_left_is_not_looked_for_in_the_round_and_one_who_is_left_is_looked_at() -> None:
+    stage = company()
+    asked_all(stage, "started")
+    stage.do(lambda arbiter: arbiter.wait_for_answers())
+    stage.until(11.0)
+    stage.feed(World(entities=PEOPLE[:2]))
+    stage.until(15.0)
+    assert looks(stage) == [(10.0, "ben"), (11.2, "cem"), (12.4, "ann"), (13.6, "ben"), (14.8, "ann")]
+
+    asked_all(stage, "failed")
+    stage.until(20.0)
+    assert looks(stage)[5:] == []
+
+
 @pytest.mark.parametrize("speakers", [("robot", "ben"), ("ben", "robot")])
 def test_who_speaks_itself_does_not_listen(speakers: tuple[str, ...]) -> None:
     stage = company()

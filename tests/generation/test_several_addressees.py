@@ -15,8 +15,13 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.robot import Robot, connect
+from engage_hri.services.commandline.embedding import services
+from engage_hri.services.commandline.shell import roster
+from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.generation.fragment_check import checked, performable
 from engage_hri.services.generation.turns.policy import TurnPolicy
+from engage_hri.services.runtime.service import running
 from tests.generation.emitted import POINT, block, by_id, emission, lines, reference
 from tests.generation.test_talked_into import call, robot
 from tests.generation.test_turn_policy import fragment
@@ -162,6 +167,14 @@ def test_the_look_after_each_point_goes_around() -> None:
     assert glances == ["bob", "ann", "bob", "ann"]
 
 
+def test_each_is_asked_to_look_and_the_point_is_held_for_all() -> None:
+    made = block(TurnFragment(id="f", addressee=("ann", "bob"), behaviors=(reference("a"),)), [(POINT, "this one")])
+
+    asked = {each.id: each.responder for each in made.behaviors if isinstance(each, Event) if each.objects}
+    assert list(asked.values()) == ["ann", "bob"]
+    assert {f"a-point:stroke_end after {id}:end" for id in asked} <= {*lines(made, "a-timing")}
+
+
 def test_who_is_spoken_to_alone_is_not_looked_around() -> None:
     text = "One two three, four five six. Seven eight nine."
     made = block(TurnFragment(id="f", addressee="ann", behaviors=(Speech(id="s", text=text),)))
@@ -216,3 +229,53 @@ async def test_a_whole_robot_asks_two_and_hears_who_answers_first(hub: MemoryHub
     else:
         assert [(each.state, each.answered_by) for each in pairs] == [("completed", answers)] * 2
         assert [each.text for each in told.heard] == ["me of course"]
+
+
+async def watched(client: Robot, owners: list[tuple[float, str]]) -> None:
+    """Note where the head goes, and when."""
+    async for told in client.head_owners():
+        if not owners or owners[-1][1] != told.owner.target:
+            owners.append((client.now(), told.owner.target))
+
+
+async def test_a_whole_robot_looks_at_three_in_turn_and_stays_with_who_answers(hub: MemoryHub) -> None:
+    owners: list[tuple[float, str]] = []
+    async with (
+        robot(hub) as client,
+        perceive("ann", hub=hub, position=(1.3, 0.5, 1.2)) as ann,
+        perceive("bob", hub=hub, position=(1.3, 0.0, 1.2)) as bob,
+        perceive("cy", hub=hub, position=(1.3, -0.5, 1.2)) as cy,
+    ):
+        for each in (ann, bob, cy):
+            await each.look_at(each.robot)
+        await asyncio.sleep(4.0)
+        watching = asyncio.create_task(watched(client, owners))
+        asking = asyncio.create_task(client.perform(call("Which one is it?"), addressee="*", await_answer=True))
+        await asyncio.sleep(5.0)
+        await cy.say("the one over there")
+        told = await asking
+        await asyncio.sleep(3.0)
+        watching.cancel()
+
+    targets = [target for _, target in owners]
+    assert [*dict.fromkeys(targets)] == ["ann", "bob", "cy"]
+    assert targets[-1] == "cy"
+    assert {each.answered_by for each in told.events if each.kind == "adjacency_pair"} == {"cy"}
+
+
+@pytest.mark.parametrize("seed", range(1, 7))
+async def test_a_party_of_three_is_asked_and_who_answers_is_looked_at(hub: MemoryHub, seed: int) -> None:
+    config = load(settings=["simulation.human=party", "simulation.people=3", f"simulation.seed={seed}"])
+    owners: list[tuple[float, str]] = []
+    async with running(hub, services(config, *roster.ROBOT, "simulation")), connect(hub=hub) as client:
+        await client.person()
+        await asyncio.sleep(8.0)
+        watching = asyncio.create_task(watched(client, owners))
+        told = await client.perform(call("Which piece do you like?"), addressee="*", await_answer=True)
+        watching.cancel()
+
+    pairs = [each for each in told.events if each.kind == "adjacency_pair"]
+    assert [each.responder for each in pairs] == ["ann", "bob", "cy"]
+    assert len({(each.state, each.answered_by, each.delay) for each in pairs}) == 1
+    spoken = [target for at, target in owners if at >= pairs[0].started.seconds]
+    assert pairs[0].answered_by in {"", *spoken}

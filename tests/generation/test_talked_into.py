@@ -143,7 +143,7 @@ async def test_what_a_manager_holds_does_not_go_on_after_an_interjection(hub: Me
     assert told.status == "done"
 
 
-@pytest.mark.parametrize(("seconds", "stops"), [(0.6, False), (1.2, True)])
+@pytest.mark.parametrize(("seconds", "stops"), [(0.6, False), (1.1, False), (1.7, True)])
 async def test_where_no_words_come_while_somebody_speaks_the_seconds_of_voice_decide(
     hub: MemoryHub, seconds: float, *, stops: bool
 ) -> None:

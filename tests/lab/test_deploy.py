@@ -94,7 +94,12 @@ def test_the_image_runs_on_the_quick_loop_as_a_user_of_its_own() -> None:
     users = [rest for word, rest in lines if word == "USER"]
     made = next(rest for word, rest in lines if word == "RUN" and rest.startswith("useradd"))
     installed = next(rest for word, rest in lines if word == "RUN" and "pip install" in rest)
+    kept = next(rest for word, rest in lines if word == "RUN" and rest.startswith("install"))
     assert users == ["10001"]
+    assert f"--owner {users[0]} " in kept
+    for file in ("compose.yaml", "compose.open.yaml"):
+        command = yaml.safe_load((FILES / file).read_text())["services"]["recognition"]["command"]
+        assert command[-1] == f"recognition.memory={kept.split()[-1]}/recognition"
     assert f"--uid {users[0]}" in made
     assert '"/source[speed]"' in installed
     assert lines.index(["USER", "10001"]) > lines.index(["RUN", installed])
@@ -179,7 +184,10 @@ def containers(file: str, variables: dict[str, str]) -> dict[str, Container]:
     for name, its in yaml.safe_load(text)["services"].items():
         mounted = {there: here for here, there, *_ in (each.split(":") for each in its.get("volumes", ()))}
         environment = {key: mounted.get(value, value) for key, value in its["environment"].items()}
-        found[name] = Container(its["command"], environment)
+        command = [word for word in its["command"] if not word.startswith("recognition.memory=")]
+        if len(command) < len(its["command"]):
+            command.remove("--set")  # its folder is the image's
+        found[name] = Container(command, environment)
     return found
 
 

@@ -5,6 +5,7 @@ docs/recognition.md.
 """
 
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 from typing import Any
 
 from msgspec import Struct
@@ -73,7 +74,7 @@ class Coder:
         """Adjacency pairs and backchannels, each as it was decided."""
         signs = [each for each in self._timeline.spans if each.to == ROBOT and each.action != "look"]
         acts: list[Span | Turn | Absence] = [*signs, *self._timeline.turns, *self._gone]
-        for act in sorted(acts, key=_known):
+        for act in self._in_order(acts):
             for side in self._sides.values():
                 self._expire(side, _known(act)[0])
             if isinstance(act, Turn):
@@ -87,6 +88,19 @@ class Coder:
         for side in self._sides.values():
             self._expire(side, 1e6)
         return sorted(self._events.values())
+
+    def _in_order(self, acts: list[Span | Turn | Absence]) -> Iterator[Span | Turn | Absence]:
+        """All that happens, as it comes: of several who begin to speak at one time, who was asked is heard first.
+
+        Unless it is known at once to whom each speaks: then who is observed first is.
+        """
+        for _, together in groupby(sorted(acts, key=_known), key=lambda act: _known(act)[0]):
+            yield from sorted(together, key=self._is_of_another)
+
+    def _is_of_another(self, act: Span | Turn | Absence) -> tuple[bool, bool]:
+        if len(self._sides) == 1 or self._timeline.tells == "early":
+            return False, False
+        return isinstance(act, Absence), isinstance(act, Span) and self._sides[act.who].asked is None
 
     def _note(self, kind: str, initiator: str, responder: str, at: float, state: str, **more: Any) -> None:
         self._events[kind, initiator, responder, at] = Coded(kind, initiator, responder, at, state, **more)

@@ -2,10 +2,12 @@
 
 Takes nothing from the code that it judges. Definitions: thesis 2.2.1 and 2.2.2, limits: docs/recognition.md. Where
 the thesis leaves it open, the coder has it as that page: a look directs when it has lasted, and a glance of the robot
-that is over by then is no answer.
+that is over by then is no answer. A request of the robot begins no look: its event starts when its look has arrived,
+or when all that it announced has come.
 """
 
 import random
+from itertools import pairwise
 from typing import NamedTuple
 
 from engage_hri.schemas.behaviors import EventKind
@@ -20,6 +22,8 @@ DIRECTS_AFTER = 0.6
 AFTER_ROBOT = 2.0
 ROUND = 1e-6
 NEVER = float("inf")
+PATIENCE = 12.0
+"""Time after the limit for which an announced gesture is waited for that does not come."""
 
 
 class Look(NamedTuple):
@@ -29,9 +33,12 @@ class Look(NamedTuple):
 
 
 class Request(NamedTuple):
+    """shown: when all gestures have come with which the robot said that it would show the target."""
+
     at: float
     kind: EventKind
     target: str
+    shown: float
 
 
 class Gazed(NamedTuple):
@@ -52,7 +59,7 @@ class Gazes:
         self._chance = random.Random(seed)
         self.looks = {who: self._drawn(who) for who in (HUMAN, ROBOT)}
         self.requests = [
-            Request(round(at + 0.003, 3), "mutual_facial_gaze" if target == HUMAN else "directed_gaze", target)
+            Request(round(at + 0.003, 3), "mutual_facial_gaze" if target == HUMAN else "directed_gaze", target, 0.0)
             for at, _, target in self.looks[ROBOT] if target and self._chance.random() < 0.4
         ]  # fmt: skip
         late = [each for each in self.requests if self._chance.random() < 0.3]
@@ -60,7 +67,11 @@ class Gazes:
             each._replace(at=round(each.at + self._chance.uniform(-1.0, 1.0), 3) + 0.0004) if each in late else each
             for each in self.requests
         ]
-        self.requests = sorted(each for each in self.requests if each.at > 0)
+        self.requests = sorted(self._drawn_shown(each) for each in self.requests if each.at > 0)
+
+    def _drawn_shown(self, request: Request) -> Request:
+        later = round(request.at + self._chance.uniform(0.0, 2.0), 3) + 0.0007
+        return request._replace(shown=self._chance.choice((request.at, request.at, later, later, NEVER)))
 
     def _drawn(self, who: str) -> list[Look]:
         chance, at, found = self._chance, 0.5 if who == HUMAN else 0.7, list[Look]()
@@ -80,14 +91,18 @@ class Gazes:
         log = Log()
         steps = [(look.since, 0, who, look) for who, looks in self.looks.items() for look in looks]
         asked = [(each.at, 1, ROBOT, each) for each in self.requests]
-        for at, _, who, what in sorted([*steps, *asked], key=lambda each: each[:3]):
+        shown = [(each.shown, 2, ROBOT, f"b{each.at}") for each in self.requests if each.at < each.shown < NEVER]
+        for at, _, who, what in sorted([*steps, *asked, *shown], key=lambda each: each[:3]):
             while (due := log.session.deadline) is not None and due < at - ROUND:
                 log.until(due)
             if isinstance(what, Look):
                 log.looks(who, what.target, at)
+            elif isinstance(what, str):
+                log.passes("gaze-1:stroke", at, block=what)
             else:
                 objects = (what.target,) if what.kind == "directed_gaze" else ()
-                log.requests_event(what.kind, at, *objects, block=f"b{at}")
+                anchors = () if what.shown == at else ("gaze-1:stroke",)
+                log.requests_event(what.kind, at, *objects, block=f"b{at}", anchors=anchors)
         log.until(1e4)
         return as_told(log.events)
 
@@ -139,6 +154,19 @@ class GazeCoder:
         found = [each for each in looks if each.target == target and each.since <= at <= each.until]
         return next((each for each in found if at < each.until or target == HUMAN), None)
 
+    def _shows(self, at: float, begins: float, limit: float) -> tuple[float, float, str]:
+        """When the robot shows what it asked for at a time, when that is over if nobody follows, and how it ends.
+
+        begins: when the person's event is over, which it met; or `at`.
+        """
+        request = next(each for each in self._requests if each.at == at)
+        looks = at if self._on(self._robot, request.target, at) else self._comes(self._robot, request.target, at)
+        shown = min(looks, request.shown)
+        if request.shown < NEVER:
+            return shown, max(shown, request.shown, begins - limit) + limit, "failed"
+        until = (shown if shown <= at + limit + PATIENCE else at) + limit + PATIENCE
+        return shown, until, "withdrawn"
+
     @staticmethod
     def _comes(looks: list[Look], target: str, after: float) -> float:
         return min((each.since for each in looks if each.target == target and each.since > after), default=NEVER)
@@ -184,8 +212,9 @@ class GazeCoder:
         self._note("directed_gaze", HUMAN, look.since, target, "failed")
         self._directed.append((known, limit, HUMAN, target))
         if asked := self._adopts(target, known, limit):
-            for at in asked[:-1]:
-                self._note("directed_gaze", ROBOT, at, target, "superseded")
+            for at, after in pairwise(asked):
+                shown, _, _ = self._shows(at, at, DIRECTED_LIMIT)
+                self._note("directed_gaze", ROBOT, min(shown, after), target, "superseded")
             self._robot_directs(target, asked[-1], limit)
 
     def _adopts(self, target: str, since: float, until: float) -> list[float]:
@@ -196,15 +225,16 @@ class GazeCoder:
 
     def _robot_directs(self, target: str, at: float, begins: float) -> None:
         """Read a direction of the robot. begins: when the person's event is over, which it met; or when it asked."""
-        limit, asks = at + DIRECTED_LIMIT, self._asks(target, begins)
-        comes = begins if self._on(self._human, target, begins) else self._comes(self._human, target, begins)
+        asks, (shown, limit, ends) = self._asks(target, begins), self._shows(at, begins, DIRECTED_LIMIT)
+        told = max(shown, begins)
+        comes = told if self._on(self._human, target, told) else self._comes(self._human, target, told)
         next_asked = min(asks, default=NEVER)
-        over = min(max(limit, begins), next_asked)
-        if comes <= max(limit, begins) + ROUND and comes < next_asked:
-            self._note("directed_gaze", ROBOT, at, target, "succeeded", comes - at)
+        over = min(limit, next_asked)
+        if comes <= limit + ROUND and comes < next_asked:
+            self._note("directed_gaze", ROBOT, shown, target, "succeeded", comes - shown)
             over = self._part(target, comes, asks, begun=begins)
         else:
-            self._note("directed_gaze", ROBOT, at, target, "failed" if limit < next_asked else "superseded")
+            self._note("directed_gaze", ROBOT, min(shown, over), target, ends if limit < next_asked else "superseded")
         self._directed.append((begins, over, ROBOT, target))
 
     def _part(self, target: str, at: float, asks: list[float], begun: float | None = None) -> float:
@@ -251,11 +281,14 @@ class GazeCoder:
         waiting: float | None = None
         for asked in self._adopts(HUMAN, at, over):
             if waiting is not None:
-                is_withdrawn = self._directs(waiting, by=ROBOT) < asked
-                self._note("mutual_facial_gaze", ROBOT, waiting, "", "withdrawn" if is_withdrawn else "superseded")
+                directs = self._directs(waiting, by=ROBOT)
+                started = min(self._shows(waiting, waiting, FACIAL_LIMIT)[0], directs, asked)
+                state = "withdrawn" if directs < asked else "superseded"
+                self._note("mutual_facial_gaze", ROBOT, started, "", state)
             waiting = asked
-        if waiting is not None and self._directs(waiting, by=ROBOT) < over:
-            self._note("mutual_facial_gaze", ROBOT, waiting, "", "withdrawn")
+        if waiting is not None and (directs := self._directs(waiting, by=ROBOT)) < over:
+            started = min(self._shows(waiting, waiting, FACIAL_LIMIT)[0], directs)
+            self._note("mutual_facial_gaze", ROBOT, started, "", "withdrawn")
             waiting = None
         if is_met:
             self._note("mutual_facial_gaze", HUMAN, at, "", "succeeded", comes - at)
@@ -265,20 +298,21 @@ class GazeCoder:
 
     def _robot_looks(self, at: float, begins: float) -> float:
         """Read a request of the robot. begins: when the person's event is over, which it met; or when it asked."""
-        limit, asks = max(at + FACIAL_LIMIT, begins), self._asks(HUMAN, begins)
-        comes = begins if self._on(self._human, ROBOT, begins) else self._comes(self._human, ROBOT, begins)
+        asks, (shown, limit, ends) = self._asks(HUMAN, begins), self._shows(at, begins, FACIAL_LIMIT)
+        told = max(shown, begins)
+        comes = told if self._on(self._human, ROBOT, told) else self._comes(self._human, ROBOT, told)
         there = self._on(self._robot, HUMAN, begins) or self._on(
             self._robot, HUMAN, self._comes(self._robot, HUMAN, begins)
         )
         leaves = NEVER if there is None else there.until
         directs, next_asked = self._directs(begins, by=ROBOT), min(asks, default=NEVER)
         if comes <= limit + ROUND and comes < min(next_asked, directs) and comes <= leaves:
-            self._note("mutual_facial_gaze", ROBOT, at, "", "succeeded", comes - at)
+            self._note("mutual_facial_gaze", ROBOT, shown, "", "succeeded", comes - shown)
             self._answers.add(comes)
             return self._part(HUMAN, comes, asks, begun=begins)
         first = min(limit, leaves, next_asked, directs)
-        state = "superseded" if first == next_asked else "failed" if first == limit else "withdrawn"
-        self._note("mutual_facial_gaze", ROBOT, at, "", state)
+        state = "superseded" if first == next_asked else ends if first == limit else "withdrawn"
+        self._note("mutual_facial_gaze", ROBOT, min(shown, first), "", state)
         return first
 
     def _directs(self, after: float, by: str = "") -> float:

@@ -10,11 +10,12 @@ from typing import Any
 
 import msgspec
 
+from engage_hri.schemas.behaviors import EVENT_KINDS
 from engage_hri.schemas.recognition import ConnectionEvent, KindStatistics, WindowStatistics
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.statistics.engagement import ENOUGH_EVENTS
-from engage_hri.services.recognition.statistics.tally import KINDS
+from tests.recognition.observations import ROBOT
 
 Life = list[ConnectionEvent]
 
@@ -42,7 +43,7 @@ def statistics(lives: list[Life]) -> WindowStatistics:
     own = sorted(started(life) for life in lives if life[0].cause != "maintenance")
     gaps = [later - earlier for earlier, later in pairwise(starts)]
     return WindowStatistics(
-        kinds=tuple(_of_kind(kind, [life for life in lives if life[0].kind == kind]) for kind in KINDS),
+        kinds=tuple(_of_kind(kind, [life for life in lives if life[0].kind == kind]) for kind in EVENT_KINDS),
         mtbce=mean(gaps), mtbce_without_maintenance=mean([b - a for a, b in pairwise(own)]),
         max_gap=max(gaps, default=None), events=len(starts),
         last_start=Stamp("loop", starts[-1]) if starts else None,
@@ -85,7 +86,8 @@ def engagement(lives: list[Life], now: Seconds, busy_until: Seconds, config: Rec
         change.state
         for life in of_window(lives, now, config.window)
         for change in life
-        if change.state in ("succeeded", "failed") and not change.optional
+        if not change.optional
+        and (change.state == "succeeded" or (change.state == "failed" and change.initiator == ROBOT))
     ]
     quality = judged.count("succeeded") / len(judged) if judged else 1.0
     return min(1.0, usual / longest if longest else 1.0) * quality

@@ -42,6 +42,10 @@ who thinks looks at nobody, and answers who has asked
     1 robot asks ann 2; 3.6 ann speaks 1; 20 end
     robot: started 1, succeeded 3.6 after 0.6, completed 4.6
 
+... however long that takes, while the robot waits
+    1 robot asks ann 2 limit=20; 12 ann speaks 1; 30 end
+    robot: started 1, succeeded 12 after 9, completed 13
+
 an answer to another is none
     1 robot asks ann 2; 2 ann looks bob; 3.6 ann speaks 1; 20 end
     robot: started 1, failed 7
@@ -49,6 +53,14 @@ an answer to another is none
 who looks at the robot while it waits has answered at once
     1 robot asks ann 2; 2 ann looks robot; 3.6 ann speaks 9; 4 known
     robot: started 1, succeeded 3.6 after 0.6
+
+... once: the next goes where her own words went
+    1 robot asks ann 1; 2.2 ann looks bob; 2.3 ann speaks 1; 3.4 ann looks nobody; 3.5 ann speaks 1; 20 end
+    robot: started 1, failed 6
+
+who has answered, and makes a sound without words, says no more
+    0.1 ann speaks 0.2 to=bob; 1 robot asks ann 2; 3.6 ann speaks 1 to=robot; 5.5 ann speaks 1; 20 end
+    robot: started 1, succeeded 3.6 after 0.6, completed 4.6
 
 somebody else answers
     1 robot asks ann 2; 2 bob looks robot; 3.6 bob speaks 1; 20 end
@@ -128,10 +140,29 @@ who was not asked answers for nobody
     robot: started 1, preempted 3.6 after 0.6 by cy
     robot: started 1, preempted 3.6 after 0.6 by cy
 
+of two who begin at once who was asked answers, and the other has a turn of their own
+    1 robot asks bob 2; 3.5 ann looks robot; 3.6 ann speaks 1; 3.6 bob speaks 1; 3.7 bob looks robot; 20 end
+    robot: started 1, succeeded 3.6 after 0.6, completed 4.6
+    ann: started 3.6, failed 8.6
+
 a typed line is for the robot
     1 ann looks bob; 2 ann types hello; 20 end
     ann: started 2, failed 6
 """
+
+
+def test_what_another_answers_is_told_with_the_words_of_that() -> None:
+    for asked, others in (("ann",), ("preempted",)), (("ann", "cy"), ("preempted", "preempted")):
+        log = Log("ann", "bob", "cy")
+        asks = f"1 robot asks {','.join(asked)} 2"
+        steps = [asks, "3 bob looks robot", "3.1 bob speaks 1", "4.5 bob said 3.1 words=the,blue,one"]
+        for at, _, feed in sorted(_spelled_out(log, steps), key=lambda each: each[:2]):
+            log.until(at - 1e-6)
+            feed()
+        told = {event.id: event for event in log.events if event.initiator == ROBOT}
+
+        assert tuple(event.state for event in told.values()) == others
+        assert {(event.answered_by, event.words) for event in told.values()} == {("bob", "the blue one")}
 
 
 @each(STORIES)
@@ -180,8 +211,9 @@ def _spelled_out(log: Log, steps: list[str]) -> Iterable[tuple[float, int, Any]]
                 end, block, cut = at + float(lasts), f"block-{number}", "cut" in named
                 for one in person.split(","):
                     asked = request_event(
-                        "adjacency_pair", at, request=f"{block}/{one}", block=block, turn=block, responder=one
-                    )
+                        "adjacency_pair", at, request=f"{block}/{one}", block=block, turn=block, responder=one,
+                        limit=float(named["limit"]) if "limit" in named else None,
+                    )  # fmt: skip
                     yield at, number, lambda at=at, asked=asked: log.feed(asked, at)
                 yield at, number, lambda at=at, b=block: log.begins(ROBOT, "speak", at, behavior=f"{b}:s")
                 yield end, number, lambda end=end, b=block: log.ends(ROBOT, "speak", end, behavior=f"{b}:s")

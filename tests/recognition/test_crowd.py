@@ -15,9 +15,10 @@ from engage_hri.schemas.requests import Accepted, Refused
 from engage_hri.services.bus.deadlines import FORGOTTEN_AFTER
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events import people
+from engage_hri.services.recognition.events.gazes import AFTER_ROBOT_DIRECTED, DIRECT_BY_LOOK
 from engage_hri.services.recognition.events.machine import PersonForgotten
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
-from engage_hri.services.recognition.events.person import AFTER_ROBOT_DIRECTED, DIRECT_BY_LOOK, PersonRecognition
+from engage_hri.services.recognition.events.person import PersonRecognition
 from engage_hri.services.recognition.events.session import Session
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from tests.random_cases import share_of

@@ -40,12 +40,11 @@ the robot may look away before the person arrives
 limit runs from the latest anchor
     1 asks dg blue anchors=gaze-1:stroke,point-1:stroke_start,phrase-1:start
     1.4 passes gaze-1:stroke; 2 passes phrase-1:start; 1.9 passes point-1:strokeStart
-    robot's dg-1 at blue: started 1
+    robot's dg-1 at blue: started 1.9
     deadline 4.5
 
 until all anchors have come the limit and the longest wait count
     1 asks dg blue anchors=gaze-1:stroke,point-1:stroke_start,phrase-1:start
-    robot's dg-1 at blue: started 1
     deadline 15.5
 
 anchors realised before the request count
@@ -55,16 +54,33 @@ anchors realised before the request count
 
 anchor offsets shift the clock and bad anchors hold nothing
     1 asks dg blue anchors=phrase-1:start+0.5,nonsense,3; 2 passes phrase-1:start
-    robot's dg-1 at blue: started 1
+    robot's dg-1 at blue: started 2
     deadline 5
 
 the end of the block ends the wait for anchors
-    1 asks dg blue anchors=phrase-1:start; 9 block done; 9 time
-    robot's dg-1 at blue: started 1, failed 9 after 8
+    1 asks dg blue anchors=phrase-1:start; 9 block done; 12 time
+    robot's dg-1 at blue: started 9, failed 11.5 after 2.5
+
+the limit of what was shown may be over when the block ends the wait for anchors
+    1 asks dg blue anchors=phrase-1:start; 1.4 robot +look blue; 9 block done; 9 time
+    robot's dg-1 at blue: started 1.4, failed 9 after 7.6
 
 what the robot never shows is withdrawn though its block never ends
     1 asks dg blue anchors=gaze-1:stroke,phrase-1:start; 1.5 passes gaze-1:stroke; 60 time
-    robot's dg-1 at blue: started 1, withdrawn 16
+    robot's dg-1 at blue: started 16, withdrawn 16
+    deadline none
+
+what the robot shows before all anchors have come starts
+    1 asks dg blue anchors=gaze-1:stroke,phrase-1:start; 1.4 robot +look blue; 2 passes phrase-1:start
+    2.2 human +look blue
+    robot's dg-1 at blue: started 1.4, succeeded 2.2 after 0.8
+
+what ends before the robot has shown anything starts as it ends
+    1 asks dg blue anchors=gaze-1:stroke; 2 asks dg blue anchors=gaze-1:stroke; 3 cancels 2
+    3 asks dg blue anchors=gaze-1:stroke; 4 lost human; 6 time
+    robot's dg-1 at blue: started 2, superseded 2
+    robot's dg-2 at blue: started 3, withdrawn 3
+    robot's dg-3 at blue: started 6, failed 6 after 0
     deadline none
 
 a request after the end of its block waits for no anchor
@@ -105,16 +121,20 @@ directing anew during shared gaze is answered by it
 
 person who is there first follows when the robot arrives
     0.5 human +look blue; 1 asks dg blue anchors=gaze-1:stroke; 1.4 robot +look blue; 2 human +look
-    robot's dg-1 at blue: started 1, succeeded 1.4 after 0.4, completed 2 lasting 0.6
+    robot's dg-1 at blue: started 1.4, succeeded 1.4 after 0, completed 2 lasting 0.6
+
+person who comes while the robot is on its way follows when it arrives
+    1 asks dg blue anchors=gaze-1:stroke; 1.2 human +look blue; 1.4 robot +look blue; 2 human +look
+    robot's dg-1 at blue: started 1.4, succeeded 1.4 after 0, completed 2 lasting 0.6
 
 person who is there first follows when the robot has pointed
     0.5 human +look blue; 1 asks dg blue anchors=gaze-1:stroke,phrase-1:start; 1.3 robot +point blue; 2 human +look
-    robot's dg-1 at blue: started 1, succeeded 1.3 after 0.3, completed 2 lasting 0
+    robot's dg-1 at blue: started 1.3, succeeded 1.3 after 0, completed 2 lasting 0
 
 person who leaves before the robot has shown anything has not followed
     0.5 human +look blue; 1 asks dg blue anchors=gaze-1:stroke; 1.2 human +look; 1.4 robot +look blue
     1.4 passes gaze-1:stroke; 4 time
-    robot's dg-1 at blue: started 1, failed 3.9 after 2.9
+    robot's dg-1 at blue: started 1.4, failed 3.9 after 2.5
 
 directed gazes at two objects are decided each for itself
     1 asks dg blue; 2 asks dg pink; 2.3 human +look pink; 3.5 time

@@ -3,6 +3,7 @@
 from itertools import pairwise
 
 import pytest
+from msgspec.structs import replace
 
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
@@ -145,6 +146,15 @@ def test_who_has_left_is_disengaged_in_time_and_comes_back_as_the_same_person():
 
     assert [level for _, level in told.levels] == ["engaged", "disengaging", "disengaged", "engaged"]
     assert told.messages[-1].session.events == 2
+
+
+def test_what_the_robot_did_not_answer_lowers_nothing():
+    told = Told()
+    for name, (initiator, responder) in {"dg-1": ("human", "robot"), "dg-2": ("robot", "human")}.items():
+        told.happens(replace(event(name, "started", 0.0), initiator=initiator, responder=responder))
+        failed = replace(event(name, "failed", 0.0, 1.9), initiator=initiator, responder=responder)
+        told.happens(failed, at=1.9)
+        assert told.messages[-1].engagement == (1.0 if initiator == "human" else 0.0)
 
 
 def test_optional_failures_lower_nothing():

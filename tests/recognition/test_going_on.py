@@ -109,4 +109,4 @@ def test_it_brings_back_who_had_gone():
     log.goes_on(HUMAN, "look", 10.0, 1.5, ROBOT)
 
     assert log.session.persons[HUMAN].presence.here
-    assert log.session.persons[HUMAN].on_robots_face
+    assert log.session.persons[HUMAN].gazes.on_robots_face

@@ -10,12 +10,13 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose, OngoingActions
-from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, OpenEvents, Statistics
+from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, OpenEvents, SamePeople, Statistics
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.intake import Intake, Output
-from engage_hri.services.recognition.perceive.identities import IDS_KEPT, Identities, renamed
+from engage_hri.services.recognition.perceive.identities import IDS_KEPT, Identities, Join
+from engage_hri.services.reports.same_people import renamed
 from engage_hri.services.runtime.intake import (
     AnswerRequest,
     Input,
@@ -88,6 +89,11 @@ class Told:
     def lives(self) -> list[tuple[str, str, str]]:
         """(state, initiator, responder) of each change that was told."""
         return [(each.state, each.initiator, each.responder) for each in self.events]
+
+    def same(self) -> dict[str, str]:
+        """The name of each person by each other id, as it was told last."""
+        (*_, told) = (each for each in self.messages(SamePeople) if isinstance(each, SamePeople))
+        return {each.actor: each.name for each in told.people}
 
     def counted(self, actor: str) -> int:
         self.until(self.now + 2.0)
@@ -238,6 +244,88 @@ def test_nobody_is_the_robot_or_has_an_id_that_cannot_be_in_a_key() -> None:
     assert told.lives() == [("started", "face_3", ROBOT)]
 
 
+@pytest.mark.parametrize("is_open", [False, True])
+@pytest.mark.parametrize("evidence", ["both in the world", "both found", "heads in turn", "somebody else"])
+def test_a_guess_ends_when_something_contradicts_it(is_open: bool, evidence: str) -> None:
+    """is_open: an event of the newer id is open by then."""
+    told = Told()
+    told.found("ann", 0.0)
+    told.take(0.0, people_at({"ann": PLACES["ann"]}))
+    told.lost("ann", 1.0)
+    told.take(1.1, people_at({}))
+    if is_open:
+        told.begins("face_3", "look", 1.2, ROBOT)
+    told.take(1.3, people_at({"face_3": PLACES["ann"]}))
+    told.begins("face_3", "point", 1.4, "blue-square")
+    assert told.same() == {"face_3": "ann"}
+
+    match evidence:
+        case "both in the world":
+            told.take(2.0, people_at({"face_3": PLACES["ann"], "ann": PLACES["ben"]}))
+        case "both found":
+            told.found("ann", 2.0)
+        case "heads in turn":
+            told.take(2.0, pose("ann", 2.0, 0.8))
+        case "somebody else":
+            told.found("face_3", 2.0, same_as="bob")
+    own = "bob" if evidence == "somebody else" else "face_3"
+    assert told.same() == ({"face_3": "bob"} if evidence == "somebody else" else {})
+    told.begins("face_3", "look", 6.0)
+    told.begins("face_3", "look", 7.0, ROBOT)
+    told.begins("ann", "look", 8.0, ROBOT)
+
+    assert [each.initiator for each in told.events if each.started.seconds >= 7.0] == [own, "ann"]
+
+
+def test_what_is_open_with_the_newer_id_is_told_again_when_the_guess_ends() -> None:
+    told = Told()
+    told.found("ann", 0.0)
+    told.take(0.0, people_at({"ann": PLACES["ann"]}))
+    told.lost("ann", 1.0)
+    told.take(1.1, people_at({}))
+    told.begins("face_3", "look", 1.2, ROBOT)
+    told.take(1.3, people_at({"face_3": PLACES["ann"]}))
+    told.take(2.0, people_at({"face_3": PLACES["ann"], "ann": PLACES["ben"]}))
+    told.take(2.5, ActionBegan(actor=ROBOT, action="look", at=stamp(2.5), targets=("face_3",), behavior="b:look"))
+
+    assert [(each.state, each.initiator, each.retold) for each in told.events] == [
+        ("started", "face_3", False), ("started", "ann", True), ("started", "face_3", True),
+        ("succeeded", "face_3", False),
+    ]  # fmt: skip
+    still_open = {each.actor: len(each.events) for each in told.messages(OpenEvents) if isinstance(each, OpenEvents)}
+    assert still_open == {"ann": 0, "face_3": 1}
+
+
+@pytest.mark.parametrize("by", ["word", "place"])
+def test_a_next_life_knows_who_is_the_same(by: str) -> None:
+    told = Told()
+    told.take(0.0, people_at({"ann": PLACES["ann"]}))
+    told.begins("ann", "look", 0.5, ROBOT)
+    if by == "word":
+        told.found("face_3", 1.0, same_as="ann")
+    else:
+        told.take(1.1, people_at({}))
+        told.take(1.3, people_at({"face_3": PLACES["ann"]}))
+    told.until(700.0)  # the names have not changed for long, but that life has told something of late
+    told.begins("ann", "look", 699.0)
+    told.begins("ann", "look", 700.0, ROBOT)
+    told.until(703.0)
+    states = [each for kind in (Statistics, SamePeople) for each in told.messages(kind)[-1:]]
+
+    reborn = Told()
+    reborn.now = 705.0
+    for state in states:
+        reborn.outputs += reborn.intake.take(Input("", state, "", 705.0), 705.0)
+    reborn.outputs += reborn.intake.begin(705.0)
+    assert reborn.same() == {"face_3": "ann"}
+    reborn.begins("face_3", "look", 706.0, ROBOT)
+    assert reborn.lives() == [("started", "ann", ROBOT)]
+    if by == "place":
+        reborn.take(707.0, people_at({"face_3": PLACES["ann"], "ann": PLACES["ben"]}))
+        reborn.take(707.1, people_at({"face_3": PLACES["ann"], "ann": PLACES["ben"]}))
+        assert reborn.same() == {}
+
+
 # -- at random ----------------------------------------------------------------------------------------------------
 
 
@@ -327,6 +415,7 @@ def test_memory_stays_flat_however_often_an_id_changes() -> None:
     for number in range(4 * IDS_KEPT):
         found = ActorFound(actor=f"face_{number}", at=stamp(number), same_as="ann")
         for join in identities.take(found, float(number)):
+            assert isinstance(join, Join)
             identities.join(join.former, join.newer, join.name)
         sizes.append(sum(kinds(identities).values()))
 

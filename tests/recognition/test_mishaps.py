@@ -10,6 +10,7 @@ from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome
 from engage_hri.schemas.requests import Accepted
 from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.events.gazes import Gazes
 from engage_hri.services.recognition.events.machine import Mishap, UndefinedTransition
 from engage_hri.services.recognition.events.mutual_facial_gaze import MutualFacialGaze
 from engage_hri.services.recognition.events.person import PersonRecognition
@@ -43,8 +44,8 @@ def meeting(*, strict: bool = False) -> Session:
 
 def break_gaze(session: Session, name: str, breaks_at: float) -> None:
     person = session.persons[name]
-    person.facial = Broken(session._writer)
-    person.facial.breaks_at = breaks_at
+    person.gazes.facial = Broken(session._writer)
+    person.gazes.facial.breaks_at = breaks_at
 
 
 def looks(actor: str, at: float, *targets: str) -> ActionBegan:
@@ -114,7 +115,7 @@ def test_a_bug_that_shows_by_the_passing_of_time_does_not_show_for_ever(monkeypa
     session = meeting()
     session.feed(looks("bob", 1.0, ROBOT), 1.0)
     session.feed(looks("eve", 1.0, ROBOT), 1.0)
-    session.persons["bob"].facial.expire = lambda at: 1 / 0  # type: ignore[method-assign, assignment]
+    session.persons["bob"].gazes.facial.expire = lambda at: 1 / 0  # type: ignore[method-assign, assignment]
     effects = session.advance(10.0)
 
     assert [effect.actor for effect in effects if isinstance(effect, Mishap)] == ["bob"]
@@ -126,7 +127,7 @@ def test_a_bug_that_shows_by_the_passing_of_time_does_not_show_for_ever(monkeypa
 
 def test_a_bug_while_a_request_is_taken_answers_it_all_the_same(monkeypatch: pytest.MonkeyPatch):
     session = meeting()
-    monkeypatch.setattr(PersonRecognition, "robot_directs", lambda *given: 1 / 0)
+    monkeypatch.setattr(Gazes, "robot_asks", lambda *given: 1 / 0)
     effects = session.feed(request_event("directed_gaze", 1.0, "blue-square", responder="bob"), 1.0)
 
     assert [type(effect).__name__ for effect in effects] == [
@@ -160,8 +161,8 @@ def test_strict_a_bug_is_raised():
 def test_an_undefined_transition_is_such_a_bug():
     session = meeting()
     session.feed(looks("bob", 1.0, ROBOT), 1.0)
-    session.persons["bob"].facial.state = "somewhere"
-    session._people.apply("bob", 1.5, lambda person: person.facial.step("limit", 1.5))
+    session.persons["bob"].gazes.facial.state = "somewhere"
+    session._people.apply("bob", 1.5, lambda person: person.gazes.facial.step("limit", 1.5))
     (mishap, lost) = session.advance(1.5)
 
     assert isinstance(mishap, Mishap)
@@ -188,7 +189,7 @@ def test_track_of_a_person_can_be_lost_from_outside():
 @pytest.mark.parametrize("seed", range(30))
 def test_every_event_ends_and_every_request_is_answered_whatever_breaks(monkeypatch: pytest.MonkeyPatch, seed: int):
     chance = random.Random(seed)
-    for name in ("gaze_changed", "points", "block_ended", "robot_looks_at_face", "leave", "pass_time"):
+    for name in ("gaze_changed", "begins", "block_ended", "robot_begins", "leave", "pass_time"):
         monkeypatch.setattr(PersonRecognition, name, _sometimes(getattr(PersonRecognition, name), chance))
     session = Session(ROBOT, RecognitionConfig(), strict=False)
     session.feed(world("ann", "bob"), 0.0)

@@ -55,13 +55,22 @@ asking during mutual gaze is answered by it
 what is asked for begins when the robot has arrived
     0.5 owner fragment rectangle; 0.6 human +look robot; 1 asks mfg anchors=gaze-1:stroke; 1.4 robot +look human
     human's mfg-1: started 0.6, preempted 0.6
-    robot's mfg-2: started 1, succeeded 1.4 after 0.4
+    robot's mfg-2: started 1.4, succeeded 1.4 after 0
 
 a person who has looked away before the robot arrives has not met it
     0.5 owner fragment rectangle; 0.6 human +look robot; 1 asks mfg anchors=gaze-1:stroke; 1.2 human +look table
     1.4 robot +look human; 1.4 passes gaze-1:stroke; 4 time
     human's mfg-1: started 0.6, preempted 0.6
-    robot's mfg-2: started 1, failed 3.3 after 2.3
+    robot's mfg-2: started 1.4, failed 3.3 after 1.9
+
+the robot's own directed gaze ends its request for the face while its head is on its way
+    1 asks mfg anchors=gaze-1:stroke; 2 asks dg blue
+    robot's mfg-1: started 2, withdrawn 2
+    robot's dg-1 at blue: started 2
+
+what an aborted turn has not shown starts as it is withdrawn
+    1 asks mfg turn=turn-1 anchors=gaze-1:stroke; 1.5 turn aborted
+    robot's mfg-1: started 1.5, withdrawn 1.5
 """
 
 
@@ -99,12 +108,18 @@ a request begins an event of its own when the person's wait ends in vain
     1 human +look robot; 1.5 asks mfg anchors=gaze-1:stroke; 1.7 human +look table; 1.8 robot +look human
     2 human +look robot
     human's mfg-1: started 1, failed 1.7 after 0.7
-    robot's mfg-2: started 1.7 since 1.5, succeeded 2 after 0.5
+    robot's mfg-2: started 1.8, succeeded 2 after 0.2
 
 a request outlasts the limit of the person's wait
     1 human +look robot; 1.5 asks mfg anchors=gaze-1:stroke; 3 robot +look human
     human's mfg-1: started 1, failed 2.9 after 1.9
-    robot's mfg-2: started 2.9 since 1.5, succeeded 3 after 1.5
+    robot's mfg-2: started 3, succeeded 3 after 0
+
+a request that is shown while it waits for the person's event has started then
+    1 human +look robot; 1.5 asks mfg anchors=gaze-1:stroke; 1.6 passes gaze-1:stroke; 1.7 human +look table
+    2 human +look robot
+    human's mfg-1: started 1, failed 1.7 after 0.7
+    robot's mfg-2: started 1.7 since 1.6, succeeded 2 after 0.4
 
 an aborted turn withdraws a request that waits for the person's event
     1 human +look robot; 1.5 asks mfg turn=turn-1; 1.6 turn aborted; 1.8 robot +look human

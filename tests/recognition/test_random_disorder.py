@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, RequestEvent, SignalTurn
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events import conversation, person, presence, session
+from engage_hri.services.recognition.events import conversation, gazes, person, presence, session
 from engage_hri.services.recognition.events.machine import Effect
 from engage_hri.services.recognition.events.session import Observation, Session
 from tests.random_cases import share_of
@@ -28,8 +28,9 @@ TIMES: dict[ModuleType, dict[str, float]] = {
     presence: {"FACE_GRACE": 2.3},
     conversation: {"TURN_PATIENCE": 12.3},
     session: {"TURN_PATIENCE": 12.3},
+    gazes: {"AFTER_ROBOT_DIRECTED": 2.3},
     person: {
-        "AFTER_ROBOT_DIRECTED": 2.3, "LONGEST_SPEECH": 60.3, "LONGEST_GESTURE": 10.3, "LONGEST_MANIPULATION": 120.3,
+        "LONGEST_SPEECH": 60.3, "LONGEST_GESTURE": 10.3, "LONGEST_MANIPULATION": 120.3,
     },
 }  # fmt: skip
 """No limit, nor the time of a lost face, is a number of full seconds: none passes between observations of a cell."""

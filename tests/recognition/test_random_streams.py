@@ -7,7 +7,7 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engage_hri.schemas.behaviors import TurnSignal
+from engage_hri.schemas.behaviors import EVENT_KINDS, TurnSignal
 from engage_hri.schemas.blocks import BlockProgress, SyncPointProgress
 from engage_hri.schemas.fragments import Claim, HeadOwner
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
@@ -16,7 +16,6 @@ from engage_hri.schemas.requests import Accepted, Cancel, Refused
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import DECISIONS
 from engage_hri.services.recognition.events.session import Observation, Session
-from engage_hri.services.recognition.statistics.tally import KINDS
 from engage_hri.services.reports.action_reports import FACE_GRACE
 from engage_hri.services.reports.ongoing_actions import GoesOn
 from tests.random_cases import share_of
@@ -53,7 +52,7 @@ class Chance:
         return kind(actor=actor, action=action, at=stamp(at), targets=(place,) if place else ())
 
     def request(self, at: float) -> Observation:
-        kind = self.pick(KINDS)
+        kind = self.pick(tuple(EVENT_KINDS))
         objects = self.pick(((), ("blue-square",), ("blue-square",), ("blue-square", "rectangle")))
         responder = self.pick(("ann", "ann", "ann", "bob", "stranger"))
         return request_event(

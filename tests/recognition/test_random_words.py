@@ -215,12 +215,12 @@ def expected_words(
         parts = sorted((at, text) for at, text in own.items() if began <= at <= end)
         return " ".join(text for _, text in parts if text)
     answered = next((change for change in life if change.response == "speak"), None)
-    if answered is None or answered.delay is None or answered.answered_by not in ("", who):
+    if answered is None or answered.delay is None:
         return ""
     turn_end = answered.at.seconds - max(0.0, answered.delay)
     if answered.state == "failed":  # a late answer may be known later still: only the limit tells when the turn ended
         turn_end = next(each.at.seconds for each in life if each.state == "failed") - CONFIG.adjacency_pair_limit
-    return said.get((who, round((turn_end + answered.delay) * 10)), "")
+    return said.get((answered.answered_by or who, round((turn_end + answered.delay) * 10)), "")
 
 
 def is_speech_of(event: ConnectionEvent, who: str) -> bool:
@@ -296,7 +296,7 @@ def test_words_alone_are_told_with_the_speech_that_they_are(seed: int) -> None:
 
     events = lives(recognized(story))
     for life in events:
-        who = life[0].person(ROBOT)
+        who = life[-1].answered_by or life[0].person(ROBOT)
         if life[-1].words:
             texts_of_person = {text for (speaker, _), text in said.items() if speaker == who}
             known = {part for text in texts_of_person for part in text.split()}

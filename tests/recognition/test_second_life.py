@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import astuple
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import Cause, Event, TurnSignal
+from engage_hri.schemas.behaviors import EVENT_KINDS, Cause, Event, TurnSignal
 from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.recognition import (
     ConnectionEvent,
@@ -24,7 +24,7 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import connect
 from engage_hri.services.recognition.former_life import FormerLife
-from engage_hri.services.recognition.statistics.tally import KINDS, EventTally
+from engage_hri.services.recognition.statistics.tally import EventTally
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.service import running
 from tests.recognition.observations import HUMAN, ROBOT, world
@@ -188,7 +188,7 @@ def test_numbers_of_a_life_that_was_broken_off_are_those_of_one(seed: int) -> No
     for number in range(60):
         at += chance.expovariate(0.3)
         cause: Cause = chance.choice(("human", "maintenance")) if number else "human"
-        kind = chance.choice(KINDS)
+        kind = chance.choice(tuple(EVENT_KINDS))
         states: tuple[EventState, ...] = ("started", chance.choice(("succeeded", "failed", "preempted")), "completed")
         for state in states:
             event = ConnectionEvent(

@@ -79,7 +79,7 @@ async def test_directed_gaze_fails_at_its_limit_after_the_last_anchor(hub: Memor
         outcome = await pending.outcome
 
     assert isinstance(outcome, EventOutcome)
-    assert (outcome.state, bus.now(), outcome.delay) == ("failed", 3.5, 3.5)
+    assert (outcome.state, bus.now(), outcome.delay) == ("failed", 3.5, 2.5)
 
 
 async def test_mutual_gaze_and_adjacency_pair_over_the_bus(hub: MemoryHub):
@@ -167,7 +167,7 @@ async def test_the_death_of_the_requester_withdraws_its_events(hub: MemoryHub):
     realizer.declare_alive()
     async with running(hub, recognition()):
         realizer.publish(keys.WORLD, world())
-        command(realizer, keys.EVENT, request(realizer, "directed_gaze", "blue-square", anchors=("gaze-1:stroke",)))
+        command(realizer, keys.EVENT, request(realizer, "directed_gaze", "blue-square"))
         with watcher.subscribe(keys.ANY_CONNECTION_EVENT) as inbox:
             started = await inbox.next()
             hub.kill("realizer")
@@ -209,7 +209,7 @@ async def test_a_block_that_ends_stops_the_wait_for_its_anchors(hub: MemoryHub):
         hub._loop.call_at(1.0, bus.publish, keys.FEEDBACK, end)
         await pending.outcome
 
-    assert bus.now() == 2.5
+    assert bus.now() == 3.5
 
 
 async def test_bad_names_never_end_the_service(hub: MemoryHub):

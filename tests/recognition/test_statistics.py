@@ -83,7 +83,7 @@ def test_neither_optional_nor_preempted_nor_withdrawn_is_a_failure():
     (facial,) = [kind for kind in tally.session().kinds if kind.kind == "mutual_facial_gaze"]
 
     assert (facial.count, facial.succeeded, facial.failed, facial.failure_rate) == (6, 1, 1, 0.5)
-    assert (tally.pace(2.0).failed, tally.pace(2.0).judged) == (1, 1)
+    assert (tally.pace(2.0, "robot").failed, tally.pace(2.0, "robot").judged) == (1, 1)
 
 
 def test_maintenance_glances_are_left_out_of_their_own_mean():
@@ -165,7 +165,7 @@ def engagement(starts: list[float], failed: int = 0) -> Engagement:
     for number, start in enumerate(starts):
         tally.feed(event(f"dg-{number}", "started", start))
         tally.feed(event(f"dg-{number}", "failed" if number < failed else "succeeded", start, 0.5))
-    return Engagement(RecognitionConfig(), tally)
+    return Engagement(RecognitionConfig(), tally, "robot")
 
 
 def test_nothing_seen_is_unknown():

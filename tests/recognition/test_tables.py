@@ -10,6 +10,7 @@ from engage_hri.schemas.behaviors import EventKind
 from engage_hri.schemas.recognition import ENDINGS
 from engage_hri.services.recognition.config import RecognitionConfig, Sensing
 from engage_hri.services.recognition.events import adjacency_pair, backchannel, directed_gaze, mutual_facial_gaze
+from engage_hri.services.recognition.events.limits import LimitClock
 from engage_hri.services.recognition.events.machine import (
     DECISIONS,
     IDLE,
@@ -93,18 +94,20 @@ def test_every_name_that_a_shared_gaze_gives_stands_in_its_table(gaze: type[Shar
     robot, human, together = gaze.ROBOT_WAITS, gaze.HUMAN_WAITS, gaze.TOGETHER
     ways = {(row.state, row.given): row.next for row in gaze.TABLE.values()}
 
-    assert ways[IDLE, gaze.ROBOT_BEGINS] == robot
+    coming = ways[IDLE, "robot_asks"]
+    assert ways[coming, gaze.ROBOT_BEGINS] == robot
     assert ways[IDLE, gaze.HUMAN_BEGINS] == human
-    assert ways[IDLE, f"{gaze.ROBOT_BEGINS}_{together}"] == ways[IDLE, f"{gaze.HUMAN_BEGINS}_{together}"] == together
+    assert ways[coming, f"{gaze.ROBOT_BEGINS}_{together}"] == together
+    assert ways[IDLE, f"{gaze.HUMAN_BEGINS}_{together}"] == together
     assert ways[IDLE, f"{gaze.HUMAN_BEGINS}_in_vain"] == IDLE
     assert ways[robot, gaze.HUMAN_JOINS] == ways[human, gaze.ROBOT_JOINS] == together
-    assert {state for state, _ in ways} == {IDLE, robot, human, together}
+    assert {state for state, _ in ways} == {IDLE, coming, robot, human, together}
 
 
 def gaze() -> mutual_facial_gaze.MutualFacialGaze:
     machine = mutual_facial_gaze.MutualFacialGaze(EventWriter("loop"))
-    machine.event = OngoingEvent(kind="mutual_facial_gaze", initiator="robot", responder="human", started=1.0)
-    machine.step("robot_looks", 1.0)
+    event = OngoingEvent(kind="mutual_facial_gaze", initiator="robot", responder="human", started=1.0)
+    machine.robot_begins(event, LimitClock(1.0, 1.9), robot_on=False, look=None)
     return machine
 
 

@@ -130,7 +130,7 @@ def test_what_the_person_asks_is_told_while_it_waits_for_the_robot() -> None:
 
     assert talk.told() == [
         ("started", 1.0, "", False), ("started", 2.6, "where is the cup", True),
-        ("failed", 6.5, "where is the cup", False),
+        ("failed", 8.0, "where is the cup", False),
     ]  # fmt: skip
 
 

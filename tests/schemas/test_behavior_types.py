@@ -108,3 +108,8 @@ def test_the_marks_of_speech_are_points_in_the_order_of_the_text() -> None:
     speech = of.Speech(id="s", text="one two", marks=(of.Mark("late", 7), of.Mark("early", 3)))
 
     assert sync_points(speech) == ("start", "early", "late", "end")
+
+
+def test_every_kind_of_event_and_every_action_has_a_row_in_order() -> None:
+    assert (tuple(of.EVENT_KINDS), tuple(of.ACTIONS)) == (get_args(of.EventKind), get_args(of.Action))
+    assert len({kind.prefix for kind in of.EVENT_KINDS.values()}) == len(of.EVENT_KINDS)

@@ -179,6 +179,15 @@ def test_the_statuses_and_the_fields_are_those_of_the_code() -> None:
     assert set(made["properties"]["turn_status"]["enum"]) == set(get_args(TurnStatus))
 
 
+@pytest.mark.parametrize("who", [False, True, "*", "ann", ("ann", "bob")])
+def test_who_may_interrupt_is_as_in_a_fragment_and_left_out_it_is_as_usual(who: object) -> None:
+    said = decoded({**CALL, "interruptible": who, "interruptible_after": 2})
+    usual = decoded(CALL)
+
+    assert (said.interruptible, said.interruptible_after) == (who, 2)
+    assert (usual.interruptible, usual.interruptible_after) == (None, None)
+
+
 def test_the_exported_tool_is_anthropics() -> None:
     assert json.loads((EXPORTED / FILE).read_bytes()) == tool_definition("anthropic")
 

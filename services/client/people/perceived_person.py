@@ -15,7 +15,7 @@ from engage_hri.schemas.advice import suggestion
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import LONGEST_ID, LONGEST_TEXT, Utterance
+from engage_hri.schemas.perception import LONGEST_ID, LONGEST_TEXT, ActorFound, Utterance
 from engage_hri.schemas.text import is_utf8
 from engage_hri.schemas.units import A_DAY, Seconds, Stamp, Vector
 from engage_hri.schemas.world import Entity, World
@@ -87,6 +87,19 @@ class PerceivedPerson:
             self._own.clear()
             self._show()
         self._tell(self._actions.leaves(self._bus.stamp()))
+
+    def same_as(self, other: str) -> None:
+        """Tell that this person is one who was told of by another id: events of both are told under that from now on.
+
+        other: that id, as a tracker of faces had it, or the name of whom it has recognized.
+
+        Raises:
+            InputRefused: `other` can be no person's id.
+        """
+        self._check()
+        if not keys.is_chunk(taken(other, str, f"{self.id}: same_as")) or other in (self.id, self.robot):
+            raise InputRefused(Fault(reason=f"{other!r} can't be another id of {self.id!r}", where=self.id))
+        self._tell([ActorFound(actor=self.id, at=self._bus.stamp(), same_as=other)])
 
     async def move_to(self, position: Vector) -> None:
         """Move the face to another place.

@@ -18,6 +18,7 @@ from engage_hri.services.commandline.shell.options import Listening
 from engage_hri.services.commandline.shell.process import DONE, run_until_signal, typed
 from engage_hri.services.commandline.shell.recording_file import opened
 from engage_hri.services.commandline.shell.settings import RobotConfig
+from engage_hri.services.console.wording import clock
 
 if TYPE_CHECKING:
     from engage_hri.services.bus.interface import Hub
@@ -150,7 +151,3 @@ async def _show(controls: "asyncio.Queue[Control]") -> None:
     while True:
         controls.put_nowait(show)
         await asyncio.sleep(SHOW)
-
-
-def clock(seconds: Seconds) -> str:
-    return f"{int(seconds) // 60}:{seconds % 60:04.1f}"

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from msgspec import Struct
 
+from engage_hri.schemas.behaviors import EVENT_KINDS
 from engage_hri.schemas.blocks import BlockProgress, BodyHeld, Held, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.body_faults import BodyFaults, words
 from engage_hri.schemas.faults import Fault
@@ -56,7 +57,7 @@ def _text(message: Message, before: Scene, after: Scene, at: Seconds, telling: T
             return f"{block}:{message.behavior}:{message.sync} at {wording.seconds(message.time)}{planned}"
         case ConnectionEvent(state=state) if state != "completed" and not message.retold:
             about = f" about {', '.join(message.objects)}" if message.objects else ""
-            kind, decided = wording.KINDS[message.kind], wording.decision(message)
+            kind, decided = EVENT_KINDS[message.kind].title, wording.decision(message)
             return f"* {kind}, {message.initiator} → {message.responder}{about} ({message.cause}): {decided}"
         case Interjection():
             return wording.interjection(message)

@@ -5,6 +5,7 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
+from engage_hri.schemas.behaviors import EVENT_KINDS
 from engage_hri.schemas.body_faults import words
 from engage_hri.schemas.text import printable
 from engage_hri.services.console import wording
@@ -147,7 +148,7 @@ def _event(row: EventInView, scene: Scene) -> tuple[RenderableType, ...]:
     return (
         Text(mark, style=style),
         Text(wording.clock(row.began - scene.began), style="dim"),
-        Text(wording.KINDS[event.kind], style="bold" if event.state == "started" else ""),
+        Text(EVENT_KINDS[event.kind].title, style="bold" if event.state == "started" else ""),
         Text(printable(f"{event.initiator}→{event.responder}")),
         Text(printable(", ".join(event.objects))),
         Text(event.cause, style="dim"),

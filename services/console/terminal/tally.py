@@ -9,7 +9,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.behaviors import EVENT_KINDS, EventKind
 from engage_hri.schemas.blocks import BlockProgress
 from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.messages import Message
@@ -92,20 +92,17 @@ def count(tally: Tally, kind: EventKind, initiator: str | None, robot: str) -> C
     )
 
 
-KINDS: tuple[tuple[EventKind, str], ...] = tuple(wording.KINDS.items())
-
-
 def render(tally: Tally, robot: str) -> RenderableType:
     """Draw the table and the last lines."""
     table = Table(box=box.HORIZONTALS, padding=0, show_edge=False)
     for name in ("by", "connection event", "count", "succeeded", "failed", "opt.", "dropped", "delay (s)"):
         table.add_column(name, justify="left" if name in ("by", "connection event") else "right", overflow="fold")
     for initiator, who in ((robot, robot), (None, "people")):
-        for kind, name in KINDS:
+        for kind, words in EVENT_KINDS.items():
             row = count(tally, kind, initiator, robot)
             if row.count:
                 numbers = (row.count, row.succeeded, row.failed, row.failed_optional, row.other + row.open)
-                table.add_row(Text(who), name, *map(str, numbers), _delays(row.delays))
+                table.add_row(Text(who), words.title, *map(str, numbers), _delays(row.delays))
     return Group(table, Text(_NOTE, style="dim"), Text(_last_lines(tally)))
 
 

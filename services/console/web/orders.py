@@ -109,27 +109,29 @@ class WizardOrder(PageOrder, frozen=True, kw_only=True):
 class Tell(WizardOrder, frozen=True, kw_only=True, tag="tell"):
     """Say words, and then what the target is, if there is one. asks: the person is to answer.
 
-    addressee: id of the person; empty: the only one.
+    addressee: ids of the people; empty: whoever is there. interruptible, interruptible_after: as in `ToolInput`.
     """
 
     text: Annotated[str, Meta(max_length=LONGEST_TEXT)] = ""
     target: Id = ""
     asks: bool = False
-    addressee: Id = ""
+    addressee: tuple[Id, ...] = ()
+    interruptible: bool | Id = ""
+    interruptible_after: Literal[0, 1, 2, 4] = 0
 
 
 class Prepared(WizardOrder, frozen=True, kw_only=True, tag="prepared"):
     """Perform a fragment of the script. number: its place there, from 0. addressee: if the fragment names nobody."""
 
     number: Annotated[int, Meta(ge=0)]
-    addressee: Id = ""
+    addressee: tuple[Id, ...] = ()
 
 
 class BackchannelOrder(WizardOrder, frozen=True, kw_only=True, tag="backchannel"):
     """Show that the robot listens. how: by a nod or a word."""
 
     how: Literal["nod", "uh-huh"] = "nod"
-    addressee: Id = ""
+    addressee: tuple[Id, ...] = ()
 
 
 class InhibitGaze(WizardOrder, frozen=True, kw_only=True, tag="inhibit"):
@@ -310,10 +312,10 @@ class Script:
         """A title for each: its words and what it refers to, or its id."""
         return tuple(map(title, self._things))
 
-    def take(self, number: int, addressee: str = "") -> Thing:
+    def take(self, number: int, addressee: tuple[str, ...] = ()) -> Thing:
         """The thing at a place, with a new id. Raises IndexError if there is none.
 
-        addressee: id of the person for whom a fragment is that names nobody.
+        addressee: ids of the people for whom a fragment is that names nobody.
         """
         thing = self._things[number]
         id = f"{thing.id}-{next(self._numbers)}"
@@ -334,13 +336,16 @@ def title(thing: Thing) -> str:
     return joined(parts) or thing.id
 
 
-def told(parts: Sequence[Part], target: str, asks: bool, addressee: str) -> dict[str, object]:
-    """A turn as the tool of language models has it, and then what is meant. asks: the person is to answer."""
-    whole = to_builtins([*parts, *([Refer(refer=target)] if target else [])])
-    return {"turn_status": "full", "turn_index": 1 if asks else 3, "parts": whole, "addressee": addressee}
+def told(order: Tell, parts: Sequence[Part]) -> dict[str, object]:
+    """A turn as the tool of language models has it. parts: its words; then comes what is meant."""
+    whole = to_builtins([*parts, *([Refer(refer=order.target)] if order.target else [])])
+    return {
+        "turn_status": "full", "turn_index": 1 if order.asks else 3, "parts": whole, "addressee": order.addressee,
+        "interruptible": order.interruptible, "interruptible_after": order.interruptible_after,
+    }  # fmt: skip
 
 
-def backchannel(how: str, addressee: str = "") -> dict[str, object]:
-    """A short sign that the robot listens. how: nod, or a word. addressee: empty: the only one."""
+def backchannel(how: str, addressee: tuple[str, ...] = ()) -> dict[str, object]:
+    """A short sign that the robot listens. how: nod, or a word. addressee: empty: whoever is there."""
     part = {"gesture": "nod"} if how == "nod" else {"say": how}
     return {"turn_status": "backchannel", "parts": [part], "addressee": addressee}

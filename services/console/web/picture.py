@@ -29,7 +29,7 @@ from engage_hri.schemas.fragments import FragmentOutcome, HeadOwner, StudyCondit
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.participants import PeerAlive, PeerGone, Status, is_claim
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.recognition import ConnectionEvent, Statistics
+from engage_hri.schemas.recognition import ConnectionEvent, SamePeople, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import Acquaintances
@@ -168,6 +168,9 @@ class Picture:
                 self._changed(f"{MEASURES}{actor}")
             case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
                 self._people.hear(message.actor, self.now)
+            case SamePeople(people=people):
+                for each in people:
+                    self._forget(each.actor)
             case BlockProgress() | SyncPointProgress() | PredictionFeedback():
                 self._take_block(message, at)
             case NetPlanned() | NetMarked() | NetWaiting():
@@ -281,14 +284,17 @@ class Picture:
 
     # -- what is shown --------------------------------------------------------------------------------------------
 
+    def _forget(self, person: str) -> None:
+        self._measures.forget(person)
+        self.reporters.pop(person, None)
+        self._drop(f"{MEASURES}{person}")
+
     def advance(self, now: Seconds) -> None:
         """Let time pass: forget what is over, and tell what is told slowly."""
         self.now = max(self.now, now)
         self._settles = self.now + SETTLED_EVERY
         for person in self._people.forgotten(self.now):
-            self._measures.forget(person)
-            self.reporters.pop(person, None)
-            self._drop(f"{MEASURES}{person}")
+            self._forget(person)
         for id in self._blocks.forget(now):
             self._drop(f"{BLOCK}{id}")
         left = self._latest_shown(nets.without_old(self._nets, now))

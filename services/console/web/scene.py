@@ -203,7 +203,8 @@ CLOSER: dict[tuple[ClaimKind, str], str] = {
     ("fragment", "until its block ends"): "it has not finished what it is saying",
     ("fragment", "thinks"): "it thinks about what to say next",
     ("hands", "manipulates"): "this hand is moving a thing",
-    ("face", "spoken to last"): "it spoke to this person last",
+    ("face", "spoken with last"): "it spoke with this person last",
+    ("face", "is to answer"): "an answer of this person or another is awaited",
     ("face", "nearest when it came"): "nobody else was nearer",
     ("face", "lost"): "the person there has gone",
 }

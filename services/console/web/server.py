@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import json
 import re
 import secrets
 import socket
@@ -22,6 +23,7 @@ from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from engage_hri.schemas.behaviors import EVENT_KINDS
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
@@ -144,6 +146,13 @@ def recorded(recording: Recording, hosts: Hosts) -> App:
     return Guarded(_app(recording.robot, frames, sessions.close), hosts)
 
 
+def page_of(robot: str, folder: Path = PAGE) -> str:
+    """The page of a robot, which knows the kinds of connection events. folder: its files."""
+    kinds = [(kind, each.short or each.title, each.is_answered) for kind, each in EVENT_KINDS.items()]
+    page = (folder / "index.html").read_text(encoding="utf-8").replace("{kinds}", escape(json.dumps(kinds)))
+    return page.replace("{robot}", escape(robot))
+
+
 def _app(
     robot: str,
     frames: Callable[[WebSocket], Awaitable[None]],
@@ -172,11 +181,11 @@ def _app(
 
 
 def _page(folder: Path, robot: str, token: str) -> Callable[[Request], Awaitable[Response]]:
-    """Answer with the `index.html` of a folder, and takes the token out of its address at the first visit.
+    """Answer with the `index.html` of a folder, and take the token out of its address at the first visit.
 
     token: empty: there is none.
     """
-    page = (folder / "index.html").read_text(encoding="utf-8").replace("{robot}", escape(robot))
+    page = page_of(robot, folder)
     imports = re.search("<script type=.importmap.>(.*?)</script>", page)
     assert imports is not None
     digest = b64encode(sha256(imports[1].encode()).digest()).decode()
@@ -190,9 +199,8 @@ def _page(folder: Path, robot: str, token: str) -> Callable[[Request], Awaitable
         rest = f"?{urlencode(asked)}" if asked else ""
         response = RedirectResponse(f"./{request.url.path.rpartition('/')[2]}{rest}", 303)
         if _is(given, token):
-            response.set_cookie(
-                _cookie(token), token, path=None, httponly=True, samesite="strict"
-            )  # path: the page's
+            # path: that of the page
+            response.set_cookie(_cookie(token), token, path=None, httponly=True, samesite="strict")
         return response
 
     return answer

@@ -184,14 +184,14 @@ class Visitor:
             self.receipts.tell("wizard", f"{server} is not on the bus: this waits for it, {PATIENCE:g} s at most")
         robot = self._window.robot
         match order:
-            case orders.Tell(text=text, target=target, asks=asks, addressee=addressee):
+            case orders.Tell(text=text, target=target):
                 parts, left_out = parts_of(text, Ids([each.id for each in self._window.picture.world.objects]))
                 if not parts and not target:
                     advice = "; ".join(left_out) or "write words, or choose an object"
                     raise InputRefused(Fault(reason="nothing to say", advice=advice))
                 if left_out:
                     self.receipts.tell("wizard", "; ".join(left_out))
-                self._drives(self._perform(orders.told(parts, target, asks, addressee)))
+                self._drives(self._perform(orders.told(order, parts)))
             case orders.Prepared(number=number, addressee=addressee):
                 if number >= len(self._window.script):
                     raise InputRefused(Fault(reason=f"the script has no fragment {number + 1}"))

@@ -23,6 +23,7 @@ from engage_hri.schemas.behaviors import (
     Gesture,
     Head,
     HeadDirectionShift,
+    Looks,
     Pointing,
     Pose,
     Posture,
@@ -168,7 +169,7 @@ def _gaze_aim(behavior: Gaze | GazeShift, situation: Situation) -> Looked:
     return _neck_aim(behavior.target, behavior.offset_angle, behavior.offset_direction, situation)
 
 
-def note_on(look: Gaze | GazeShift | HeadDirectionShift) -> str:
+def note_on(look: Looks) -> str:
     """Note what a neck does otherwise than a look asks."""
     if isinstance(look, HeadDirectionShift):
         return ""
@@ -236,4 +237,4 @@ def eye_target(behavior: BlockBehavior | None) -> str:
     """Id of the entity on the gaze axis once the motion is done; empty: none, as with an offset."""
     if isinstance(behavior, Gaze | GazeShift) and behavior.offset_angle and behavior.offset_direction:
         return ""
-    return behavior.target if isinstance(behavior, Gaze | GazeShift | HeadDirectionShift) else ""
+    return behavior.target if isinstance(behavior, Looks) else ""

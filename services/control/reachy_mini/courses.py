@@ -11,7 +11,7 @@ from math import radians
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Gesture, HeadDirectionShift, Pointing, Speech
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Gesture, Looks, Pointing, Speech
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.vocabulary import normal
@@ -24,7 +24,6 @@ from engage_hri.services.control.motion.points import WalkPoint, held_on_target
 from engage_hri.services.control.reachy_mini import joints
 from engage_hri.services.control.reachy_mini.joints import Angles, Mounting
 
-Looks = Gaze | GazeShift | HeadDirectionShift
 TYPES = tuple(each for each in choreography.TYPES if each not in (Pointing, Gesture, Speech))
 """Types of behaviors that it performs."""
 LEAST = {"head": radians(0.3), "nod": 0.0, "torso": radians(0.4), "face": radians(1.5)}

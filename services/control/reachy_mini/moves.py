@@ -11,7 +11,7 @@ from math import inf, radians
 import numpy as np
 from msgspec import Struct
 
-from engage_hri.schemas.behaviors import BlockBehavior
+from engage_hri.schemas.behaviors import BlockBehavior, Looks
 from engage_hri.schemas.body import BodyPose, Estimate
 from engage_hri.schemas.units import Radians, Seconds, Vector
 from engage_hri.schemas.world import World
@@ -27,7 +27,7 @@ from engage_hri.services.control.motion.path import Array, JointMotion, Leg, Pat
 from engage_hri.services.control.motion.points import WalkPoint, is_shift
 from engage_hri.services.control.motion.track import Place, Track
 from engage_hri.services.control.reachy_mini import courses, joints
-from engage_hri.services.control.reachy_mini.courses import Circumstances, Looks
+from engage_hri.services.control.reachy_mini.courses import Circumstances
 from engage_hri.services.control.reachy_mini.joints import Angles, Mounting
 from engage_hri.services.control.reachy_mini.link import GAP
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings

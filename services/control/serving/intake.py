@@ -37,10 +37,8 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import (
     Action,
     BlockBehavior,
-    Gaze,
-    GazeShift,
     Head,
-    HeadDirectionShift,
+    Looks,
     Pointing,
     Speech,
 )
@@ -62,6 +60,7 @@ from engage_hri.schemas.body_faults import BodyFault, BodyFaults, FaultsSwitched
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, OngoingActions
+from engage_hri.schemas.recognition import SamePeople
 from engage_hri.schemas.requests import Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import COVERED_FOR, CoveredObjects, World
@@ -73,6 +72,7 @@ from engage_hri.services.control.serving import effects, steps
 from engage_hri.services.control.serving.live_behavior import LiveBehavior, Status
 from engage_hri.services.control.serving.words_for_voice import progress_of
 from engage_hri.services.reports.ongoing_actions import OngoingActionTracker
+from engage_hri.services.reports.same_people import PeopleNames
 from engage_hri.services.requests.serving import HoldRequest
 from engage_hri.services.runtime.intake import AnswerRequest, Input, PublishMessage
 
@@ -95,6 +95,7 @@ class ControlIntake:
         self._clock = clock
         self._config = config
         self._objects = CoveredObjects(COVERED_FOR)
+        self._names = PeopleNames()
         self._able = Capabilities(body="", types=(), parts=())
         self._faults: tuple[BodyFault, ...] = ()
         """Faults that the body plays."""
@@ -135,8 +136,9 @@ class ControlIntake:
         self._now = now
         match step := input.message:
             case World():
-                self.world = self._objects.see(step, now)
-                self._do(effects.ShowWorld(self.world))
+                self._show(self._objects.see(step, now))
+            case SamePeople() if self._names.take(step):
+                self._show(self._objects.at(now))
             case steps.RequestHanded():
                 self._serve(step)
             case HoldRequest():
@@ -163,6 +165,12 @@ class ControlIntake:
             case steps.BodyComplained(fault=fault):
                 self._do(effects.Alert(fault))
         return self._take()
+
+    def _show(self, world: World | None) -> None:
+        """Let the body see the world, in which people are found by any of their ids."""
+        if world is not None:
+            self.world = self._names.by_any_id(world)
+            self._do(effects.ShowWorld(self.world))
 
     def _take(self) -> list[effects.Effect]:
         outputs, self._outputs = self._outputs, []
@@ -341,7 +349,7 @@ class ControlIntake:
     def _look(self, moved: steps.EyesMoved) -> None:
         """Publish what the eyes rest on now. A behavior of the head has brought them there, if it tells just then."""
         live = self._live.get(moved.request)
-        of_head = live is not None and isinstance(live.request.behavior, Gaze | GazeShift | HeadDirectionShift)
+        of_head = live is not None and isinstance(live.request.behavior, Looks)
         self._act(self._actions.looks_at(moved.on, live.label if live is not None and of_head else "", moved.at))
 
     def _act(self, actions: list[ActionMessage]) -> None:

@@ -1,7 +1,7 @@
 """Steps of control: what its intake takes, from the bus, from the desk and from the driver. Pure.
 
-Control decides by these alone (`intake.py`), so that it can be done again from a recording. All but the world come by
-no bus; they stand in the ledger of control, whole.
+Control decides by these alone (`intake.py`), so that it can be done again from a recording. The world, and
+who is the same, come by the bus. The others stand in the ledger of control, whole.
 """
 
 from typing import Literal
@@ -11,6 +11,7 @@ from msgspec import Struct
 from engage_hri.schemas.body import AbortBehavior, Capabilities, GoHome, PerformBehavior
 from engage_hri.schemas.body_faults import BodyFault, SwitchFaults
 from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.recognition import SamePeople
 from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
@@ -123,6 +124,6 @@ class BodyComplained(Struct, frozen=True, tag="body_complained"):
 
 ControlStep = (
     World | RequestHanded | HoldRequest | ControlBegan | BodyTold | StreamEnded | AuthorityRevoked | EyesMoved
-    | HomeEnded | FaultsPlayed | BodyComplained
+    | HomeEnded | FaultsPlayed | BodyComplained | SamePeople
 )  # fmt: skip
 """Everything by which control decides, but for the time."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from engage_hri.schemas.behavior_types import sync_points
-from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Head, Pointing
+from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Head, Looks, Pointing
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, Phase, PlannedTime, Ray
 from engage_hri.schemas.units import Degrees, Meters, Radians, Seconds
 from engage_hri.schemas.world import World
@@ -35,7 +35,6 @@ from engage_hri.services.control.testing.stage import (
 )
 from engage_hri.services.control.testing.suite import (
     AIMED,
-    LOOKS,
     Suite,
     by_each,
     does_not_apply,
@@ -140,14 +139,14 @@ class PredictionLaws(Suite):
         due = pose_angles(estimate.pose_end)
         self.check_pose(await self.pose(body), due, joints, "end", what="where `pose_end` said")
 
-    @by_each(LOOKS, "no looks")
+    @by_each(Looks, "no looks")
     async def test_predicts_from_where_another_look_leaves_it(self, body: Body, behavior: BlockBehavior) -> None:
         """An estimate from the `pose_after` of another look, or of the same, is what it then takes from there.
 
         Usually `estimate` ignores its `pose`, and takes the present one: generation asks about several references.
         What its estimates are wrong by anyhow, from home, counts for nothing here.
         """
-        assert isinstance(behavior, LOOKS)
+        assert isinstance(behavior, Looks)
         sync, said = target_point(behavior), body.estimate(behavior, None, self.world)
         off = await self._took(body, behavior, sync) - until_target(said, behavior)
         for other in self.aims(body, behavior):

@@ -28,6 +28,7 @@ from engage_hri.schemas.behaviors import (
     Gesture,
     Head,
     HeadDirectionShift,
+    Looks,
     Mark,
     Pointing,
     Pose,
@@ -58,8 +59,7 @@ from engage_hri.services.control.testing.motions import Array
 from engage_hri.services.control.testing.stage import PATIENCE, Connection, Stage, default, standing, still_running
 from engage_hri.services.runtime.virtual_time import VirtualTimeLoop
 
-LOOKS = Gaze | GazeShift | HeadDirectionShift
-AIMED = LOOKS | Pointing
+AIMED = Looks | Pointing
 WORLD = World(
     entities=(
         Entity(id="human", kind="person", position=(1.3, 0.0, 1.2)),

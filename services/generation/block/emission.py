@@ -22,6 +22,8 @@ from engage_hri.schemas.behaviors import (
     Gaze,
     Hand,
     Head,
+    Locomotion,
+    Looks,
     Mark,
     Pointing,
     Reference,
@@ -53,8 +55,6 @@ from engage_hri.services.generation.inhibitions import Permits
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation, Stroke, first_met, stroke
 from engage_hri.services.generation.turns.policy import TurnPlan
 
-_LOOKS = frozenset(("gaze", "gazeShift", "headDirectionShift", "locomotion"))
-"""Types of behaviors that turn the head elsewhere."""
 _PHRASE_END = re.compile(r"[.,;:!?…]+(?=\s+\w)|[。、！？，；：]+(?=\w)")
 PHRASE = 2.0
 """Least number of words between two looks at addressees: a look takes about half a second. Ours."""
@@ -325,7 +325,7 @@ class Emission:
 
     def _looks_around(self) -> list[Gaze]:
         """Looks at several addressees in turn, from one phrase to the next, if the fragment has no looks itself."""
-        has_looks = any(type_name(each) in _LOOKS for each in self.kept) or any(
+        has_looks = any(isinstance(each, Looks | Locomotion) for each in self.kept) or any(
             each.gaze for each in self.parts.values()
         )
         if not self.turn.others or has_looks or not self.permits.looks:

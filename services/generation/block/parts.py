@@ -1,6 +1,7 @@
 """Behaviors that replace a reference, and their timing: `check-back`, of Appendix B, or `figure-3.3`."""
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import (
     After,
@@ -23,7 +24,8 @@ from engage_hri.services.generation.turns.policy import TurnPlan
 class Made(Struct, frozen=True):
     """Ids of the behaviors that a block has for one reference; "": it has none.
 
-    words: of its phrase, as chosen. falls: the phrase falls with a gesture (see `Parts`).
+    events: one for each who is to look there. words: of its phrase, as chosen. falls: the phrase falls with a gesture
+    (see `Parts`).
     """
 
     reference: str
@@ -31,7 +33,7 @@ class Made(Struct, frozen=True):
     gaze: str = ""
     point: str = ""
     phrase: str = ""
-    event: str = ""
+    events: tuple[str, ...] = ()
     words: str = ""
     falls: bool = False
 
@@ -84,7 +86,8 @@ class Parts:
         required, line = reference.required, reference.line
         given = () if required else needs
         self.reference = reference
-        self.gaze = self.point = self.phrase = self.event = self.glance = ""
+        self.gaze = self.point = self.phrase = self.glance = ""
+        self.events: tuple[str, ...] = ()
         self.behaviors: list[BlockBehavior] = []
         anchors: list[str] = []
         if looks:
@@ -107,24 +110,24 @@ class Parts:
             self.behaviors.append(Speech(id=self.phrase, text=said, required=required, needs=phrase_needs, line=line))
             anchors.append(f"{self.phrase}:start")
         if looks and choice.gesture != "gaze":
-            self.event = names.fresh(f"{reference.id}-event")
-            self.behaviors.append(
-                Event(
-                    id=self.event,
-                    kind="directed_gaze",
-                    responder=turn.addressee,
-                    objects=(reference.target,),
-                    cause="reference",
-                    anchors=tuple(anchors),
-                    turn=turn.turn,
-                    timing=(Timing("start", f"{self.gaze}:start"),),
-                    needs=tuple(filter(None, (self.gaze, self.point))),
-                )
+            made = Event(
+                id="",
+                kind="directed_gaze",
+                responder="",
+                objects=(reference.target,),
+                cause="reference",
+                anchors=tuple(anchors),
+                turn=turn.turn,
+                timing=(Timing("start", f"{self.gaze}:start"),),
+                needs=tuple(filter(None, (self.gaze, self.point))),
             )
+            asked = {names.fresh(f"{reference.id}-event"): each for each in turn.addressees}
+            self.behaviors += [replace(made, id=id, responder=each) for id, each in asked.items()]
+            self.events = tuple(asked)
 
         falls = bool(self.phrase and looks and not required)
         self.made = Made(
-            reference.id, reference.target, self.gaze, self.point, self.phrase, self.event, choice.phrase, falls
+            reference.id, reference.target, self.gaze, self.point, self.phrase, self.events, choice.phrase, falls
         )
 
     @property
@@ -153,7 +156,7 @@ def checking_back(parts: Parts, preceding: str, earlier: str, is_timed: bool, gl
     preceding: the speech or phrase before this one. earlier: the last one of the turn's earlier fragments. is_timed:
     the author has said when the reference starts. glance: the last one before it. "": there is none.
     """
-    gaze, point, phrase, event = parts.gaze, parts.point, parts.phrase, parts.event
+    gaze, point, phrase = parts.gaze, parts.point, parts.phrase
     operators: list[Operator] = []
     if phrase and preceding:
         operators.append(after(f"{preceding}:end", f"{phrase}:start"))
@@ -173,7 +176,7 @@ def checking_back(parts: Parts, preceding: str, earlier: str, is_timed: bool, gl
         if phrase:
             operators.append(same(f"{point}:stroke_start", f"{phrase}:start"))
             operators.append(after(f"{phrase}:end", f"{point}:stroke_end"))
-        operators.append(after(f"{event}:end", f"{point}:stroke_end"))
+        operators += [after(f"{event}:end", f"{point}:stroke_end") for event in parts.events]
     return operators
 
 

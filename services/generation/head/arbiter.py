@@ -23,6 +23,7 @@ from engage_hri.services.generation.head.listening_policy import ListeningPolicy
 from engage_hri.services.generation.head.maintenance_policy import FaceWatch, GlanceWatch, HandWatch, OfPeople
 from engage_hri.services.generation.head.response_policy import ResponsePolicy
 from engage_hri.services.generation.inhibitions import Inhibition
+from engage_hri.services.reports.same_people import renamed
 
 DWELL: Seconds = 0.3
 """Time that the head stays after its owner let go, before a lower claim gets it: a claim that comes back at once
@@ -90,7 +91,7 @@ class Arbiter:
     """The six claims and the owner of the head. `feed` it what happens; `rule` then, and when `deadline` has come."""
 
     def __init__(self, robot: str, config: GenerationConfig) -> None:
-        self._config = config
+        self._robot, self._config = robot, config
         self._responses = ResponsePolicy(robot)
         self._listening = ListeningPolicy(robot)
         self._hands = HandWatch(robot)
@@ -99,6 +100,8 @@ class Arbiter:
         self._people = Acquaintances()
         self._inhibition: Inhibition | None = None
         self._fragment: Claim | None = None
+        self._waits = False
+        """The robot's last turn is over, and no other has begun."""
         self._thought: Claim | None = None
         self._world: World | None = None
         self._state: RobotState | None = None
@@ -136,6 +139,8 @@ class Arbiter:
                 if self._config.listens:
                     self._listening.feed(observation, now)
             case ConnectionEvent():
+                if observation.kind == "adjacency_pair" and observation.initiator == self._robot:
+                    self._faces.partner = observation.answered_by or self._faces.partner
                 self._listening.feed(observation, now)
                 self._glances.feed(observation, now)
                 self._responses.feed(
@@ -185,7 +190,23 @@ class Arbiter:
         self._thought = None
 
     def speak_to(self, person: str) -> None:
-        self._faces.partner = person
+        self._faces.partner, self._waits = person, False
+
+    def wait_for_answers(self) -> None:
+        """Note that the robot's turn is over: from now on those whom it has asked may answer."""
+        self._waits = True
+
+    def join(self, other: str, name: str) -> None:
+        """Take two ids for one person, who is called `name` from now on. The next world has nobody called `other`."""
+
+        def joined(id: str) -> str:
+            return name if id == other else id
+
+        self._faces.join(other, name)
+        self._glances.forget(other)
+        self._owner = renamed(self._owner, joined)
+        self._base, self._held = renamed(self._base, joined), renamed(self._held, joined)
+        self._fragment, self._thought = (each and renamed(each, joined) for each in (self._fragment, self._thought))
 
     def shift_failed(self, id: str, now: Seconds) -> None:
         """Note that shift `id` did not arrive: the same place is tried again after a pause, any other at once."""
@@ -233,18 +254,21 @@ class Arbiter:
                 self._glances.began(now)
         if before.kind == "glance" != self._owner.kind:
             self._glances.ended(now)
+        self._faces.has_head(self._owner.kind == "face", now)
         self._glances.head_is_on_face(self._faces.is_face(self._head_on()), now)
         self._waiting = tuple(claim for claim in claims if claim.kind != self._owner.kind)
         changed = self._owner != before or self._waiting != waited
         return Ruling(self._owner, self._since, self._waiting, changed, self._shift(now))
 
     def _claims(self, now: Seconds) -> list[Claim]:
-        face = self._faces.claim(now)
+        face = self._faces.claim(now, self._listening.asked if self._waits else ())
         self._glances.face = face.target if face else ""
-        listens = self._listening.claim(now, self._faces.present(now))
+        present = self._faces.present(now)
+        listens = self._listening.claim(now, present)
+        answers = self._responses.claim(now, {*present} - {*self._listening.drawing(present)})
         claims = [
             self._inhibition.claim if self._inhibition else None, self._fragment or self._thought,
-            self._glances.claim(now), self._responses.claim(now) or listens, self._hands.claim(now), face,
+            self._glances.claim(now), answers or listens, self._hands.claim(now), face,
         ]  # fmt: skip
         return [claim for claim in claims if claim is not None]
 

@@ -1,6 +1,7 @@
 """The listening policy: while the robot is silent and people speak, it looks at the speaker, as a listener does.
 
-It looks at who spoke first of those who speak. While it waits for an answer, only the people whom it asked draw it.
+It looks at who spoke first of those who speak. While it waits for an answer only those whom it asked draw it; while
+somebody speaks to it nobody else does.
 """
 
 from collections.abc import Collection
@@ -22,6 +23,8 @@ class ListeningPolicy:
         self._robot = robot
         self._speaking: dict[str, Seconds] = {}
         """Since when each speaks, as it was heard here; the first first."""
+        self._to_robot: list[str] = []
+        """Those of them of whom it is known that they speak to the robot."""
         self._asked: dict[str, str] = {}
         """Who is to answer each open adjacency pair of the robot."""
         self._speaker = ""
@@ -34,6 +37,7 @@ class ListeningPolicy:
             case Floor(speeches=speeches):
                 known, self._speaking = self._speaking, {each.actor: now for each in speeches}
                 self._speaking |= {who: since for who, since in known.items() if who in self._speaking}
+                self._to_robot = [each.actor for each in speeches if self._robot in each.to]
             case ConnectionEvent(kind="adjacency_pair", initiator=self._robot, state="started"):
                 self._asked[message.id] = message.responder
             case ConnectionEvent():
@@ -41,7 +45,16 @@ class ListeningPolicy:
 
     def forget(self) -> None:
         """Drop everything: who told it has gone."""
-        self._speaking, self._asked, self._speaker, self._until = {}, {}, "", None
+        self._speaking, self._to_robot, self._asked, self._speaker, self._until = {}, [], {}, "", None
+
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """Ids of the people whose answers the robot waits for, in the order in which it named them."""
+        return tuple(dict.fromkeys(self._asked.values()))
+
+    def drawing(self, present: Collection[str]) -> list[str]:
+        """People who draw the look, of those whose faces are to be seen."""
+        return [who for who in self.asked or self._to_robot if who in present] or [*present]
 
     @property
     def deadline(self) -> Seconds | None:
@@ -56,7 +69,7 @@ class ListeningPolicy:
         if self._robot in self._speaking:
             self._speaker, self._until = "", None
             return None
-        draws = [who for who in self._asked.values() or present if who in present]
+        draws = self.drawing(present)
         heard = [who for who, since in self._speaking.items() if who in draws and now >= since + ONSET]
         if heard:
             self._speaker, self._until = heard[0], None

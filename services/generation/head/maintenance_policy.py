@@ -6,6 +6,7 @@ and when nothing has connected them for longer than usual they check with a glan
 
 import math
 from collections import Counter
+from collections.abc import Iterable
 from itertools import takewhile
 
 from msgspec import Struct
@@ -27,6 +28,8 @@ HAND_STILLNESS: Seconds = 0.8
 """Time that a hand is still before the head leaves it. Ours."""
 GLANCE_DURATION: Seconds = 0.9
 """Time that a glance at the face lasts before the head goes back. Ours."""
+ROUND: Seconds = 1.2
+"""Time for which the head is on each of several people who were asked, until one of them speaks. Ours."""
 MTBCE_PRIOR: Seconds = 5.7
 """Mean time between connection events that is assumed until `MTBCE_EVENTS` of them were seen. Table 2.1."""
 MTBCE_LOW: Seconds = 3.0
@@ -145,7 +148,11 @@ class HandWatch:
 
 
 class FaceWatch:
-    """Claim 6: the face of the person spoken to last, else the nearest one; if all are lost, the last direction."""
+    """Claim 6: the face of the person spoken to last, else the nearest one; if all are lost, the last direction.
+
+    While several people are to answer, the face of one after the other: the one named first comes last, for the look
+    at the end of the turn was for that one.
+    """
 
     def __init__(self, robot: str) -> None:
         self._robot = robot
@@ -158,7 +165,10 @@ class FaceWatch:
         self._seen: Seconds = float("-inf")
         self._followed = ""
         self.partner = ""
-        """Id of the person spoken to last."""
+        """Id of the person spoken to last, or who has answered last."""
+        self._goes_round = False
+        self._next_at: Seconds | None = None
+        """Time to go on to the next one who is to answer; None: the head is not on a face by this claim."""
 
     def feed(self, message: World | OfPeople, now: Seconds) -> None:
         match message:
@@ -185,6 +195,14 @@ class FaceWatch:
         self._lost.comes(id)
         self._here.add(id)
 
+    def join(self, other: str, name: str) -> None:
+        """Take two ids for one person: `other` has not been lost, but is `name`."""
+        self.partner, self._followed = (name if id == other else id for id in (self.partner, self._followed))
+        if other in self._people:
+            self._people[name] = self._people.pop(other)
+            self._find(name)
+        self.forget(other)
+
     def forget(self, id: str) -> None:
         """Drop somebody who has been gone for long."""
         self._here.discard(id)
@@ -203,18 +221,37 @@ class FaceWatch:
     @property
     def deadline(self) -> Seconds | None:
         due = (since + FACE_GRACE for _, since in self._lost.latest())
-        return min(takewhile(lambda at: at > self._seen, due), default=None)
+        lost = takewhile(lambda at: at > self._seen, due)
+        return min((*lost, *([] if self._next_at is None else [self._next_at])), default=None)
 
-    def claim(self, now: Seconds) -> Claim | None:
+    def has_head(self, has: bool, now: Seconds) -> None:
+        """Note whether the arbiter gives the head to this claim."""
+        if not has or not self._goes_round:
+            self._next_at = None
+        elif self._next_at is None:
+            self._next_at = now + ROUND
+
+    def claim(self, now: Seconds, asked: Iterable[str] = ()) -> Claim | None:
+        """asked: ids of the people who are to answer now, in the order in which they were named."""
         self._seen = now
         present = self.present(now)
+        to_answer = [who for who in asked if who in present]
+        if len(to_answer) > 1:
+            is_due = self._next_at is not None and now >= self._next_at
+            if is_due or not self._goes_round or self._followed not in to_answer:
+                place = to_answer.index(self._followed) if self._followed in to_answer else -1
+                self._followed = to_answer[(place + 1) % len(to_answer)]
+                self._next_at = None
+            self._goes_round = True
+            return Claim(kind="face", priority=6, target=self._followed, reason="is to answer: others are, too")
+        self._goes_round = False
         if not present:
             return Claim(kind="face", priority=6, reason="lost: hold the direction") if self._has_met else None
         if self.partner in present:
             self._followed = self.partner
         elif self._followed not in present:  # stay with a face while it is seen, however people move about
             self._followed = present[0]
-        reason = "spoken to last" if self._followed == self.partner else "nearest when it came"
+        reason = "spoken with last" if self._followed == self.partner else "nearest when it came"
         return Claim(kind="face", priority=6, target=self._followed, reason=reason)
 
     def is_face(self, target: str) -> bool:

@@ -6,11 +6,12 @@ words takes knowledge of the task: that is the collaboration manager's.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from statistics import fmean
 
 from msgspec import Struct
 
+from engage_hri.schemas.behaviors import EVENT_KINDS
 from engage_hri.schemas.body import Ray
 from engage_hri.schemas.fragments import Claim
 from engage_hri.schemas.recognition import ConnectionEvent
@@ -79,13 +80,16 @@ class ResponsePolicy:
             due += [turn for turn in self._turns(answer) if turn > self._seen]
         return min(due, default=None)
 
-    def claim(self, now: Seconds) -> Claim | None:
+    def claim(self, now: Seconds, others: Collection[str] = ()) -> Claim | None:
+        """others: people who seek the robot's eyes in vain now, for it attends to somebody else."""
         self._seen = now
         for id in [id for id, answer in self._open.items() if answer.until is not None and now >= answer.until]:
             del self._open[id]
         for answer in reversed(self._open.values()):
+            if answer.event.kind == "mutual_facial_gaze" and answer.event.initiator in others:
+                continue
             index = sum(now >= turn for turn in self._turns(answer))
-            kind = answer.event.kind.replace("_", " ")
+            kind = EVENT_KINDS[answer.event.kind].title
             return Claim(
                 kind="response",
                 priority=4,

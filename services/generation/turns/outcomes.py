@@ -1,6 +1,6 @@
 """Outcomes of the robot's turns, once all of each is decided: connection events, and what people said. Pure."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
 from typing import Literal
 
 from msgspec import Struct
@@ -131,6 +131,8 @@ class TurnEvents:
         """The turn of each block."""
         self._changed: dict[str, Seconds] = {}
         """When each event came to its state."""
+        self.session = ""
+        """Session of recognition's present life; empty: none is there, as far as is known."""
 
     def expect(self, block: str, turn: str) -> None:
         self._turn_of[block] = turn
@@ -151,6 +153,7 @@ class TurnEvents:
 
     def lose(self, session: str = "") -> None:
         """End undecided events of other sessions as lost: recognition is gone, or has come back as `session`."""
+        self.session = session
         for id, event in self._events.items():
             if event.state == "started" and event.session != session:
                 self._events[id] = replace(event, state="lost")
@@ -225,6 +228,11 @@ class TurnOutcomes:
         if not turn.backchannel:
             self._records.setdefault(turn.turn, _Record(turn.addressee, turn.others)).spoken[fragment] = ()
         return displaced
+
+    def rename(self, name: Callable[[str], str]) -> None:
+        """Tell of people by other ids from now on. name: the new one of each."""
+        for record in self._records.values():
+            record.addressee, record.others = name(record.addressee), tuple(map(name, record.others))
 
     def refuse(self, fragment: str, turn: TurnPlan) -> None:
         """Take a fragment out of its turn again: the realizer has refused it."""

@@ -8,7 +8,7 @@ Fragments of one turn arrive one by one while earlier ones are still performed. 
 was accepted; whatever ends it early (barge-in, fault, cancellation, silence) also ends the fragments in line.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from typing import Literal
 
 from msgspec import Struct
@@ -17,12 +17,15 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import EVERYBODY, TurnFragment, TurnStatus, ids_in
+from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import Interjection
 from engage_hri.schemas.requests import are_of_one_run
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.generation.turns.interjections import UNDECIDED, Interjections
 from engage_hri.services.reports.action_reports import FACE_GRACE
+from engage_hri.services.reports.same_people import renamed
+from engage_hri.services.text.listening import is_listening, says_words
 
 TURN_SILENCE: Seconds = 10.0
 """Silence after which an open turn closes as aborted. Recognition waits for its end for longer. Ours."""
@@ -220,6 +223,13 @@ class TurnPolicy:
         """Note that the block of a fragment of `turn` is on its way."""
         self._begun.setdefault(turn, False)
 
+    def rename(self, name: Callable[[str], str]) -> None:
+        """Speak to people by other ids from now on. name: the new one of each."""
+        self._live = {id: renamed(plan, name) for id, plan in self._live.items()}
+        self._open = self._open and renamed(self._open, name)
+        self._away = {name(id): since for id, since in self._away.items()}
+        self.interjections.rename(name)
+
     def turn_ended(self, turn: str, now: Seconds) -> None:
         """Note that a turn is over: its end was signalled. Its last block may go on for a moment."""
         if turn in self._begun:
@@ -273,6 +283,12 @@ class TurnPolicy:
         elif self.interjections.feed(told, current.turn, now, after=current.gives_way_after(told.actor)):
             self._taken_by = told.actor
 
+    def hear(self, utterance: Utterance, now: Seconds) -> None:
+        """Note words, by which a voice without any may turn out to interrupt."""
+        says_more = says_words(utterance.text) and not is_listening(utterance.text)
+        if utterance.final and says_more and self.interjections.decide_wordless(utterance.actor, now, has_words=True):
+            self._taken_by = utterance.actor
+
     @property
     def held(self) -> str:
         """The turn that waits because it is undecided whether somebody interrupts it; "": none does."""
@@ -302,6 +318,7 @@ class TurnPolicy:
         waiting = self.interjections.waits_in(turn)
         limits = {("undecided", actor): opened + UNDECIDED for actor, opened in waiting.items()}
         limits |= {("counts", actor): at for actor, at in self.interjections.unheeded_in(turn).items()}
+        limits |= {("lasts", actor): at for actor, at in self.interjections.wordless_in(turn).items()}
         if self._barge_in is not None:
             voiced = self.interjections.voiced_in(turn)
             limits |= {("talks", actor): opened + self._barge_in for actor, opened in voiced.items()}
@@ -328,9 +345,12 @@ class TurnPolicy:
         for name, at in limits.items():
             self._waits.keep(name, at, now)
         why, who = self._waits.due(now) or ("", "")
-        while why in ("undecided", "counts"):
+        while why in ("undecided", "counts", "lasts"):
             if why == "undecided":
                 self.interjections.give_up(who, now)
+            elif why == "lasts":
+                if self.interjections.decide_wordless(who, now, has_words=False):
+                    self._taken_by = who
             elif self.interjections.heed(who, now):
                 self._taken_by = who
             why, who = self._waits.due(now) or ("", "")

@@ -17,7 +17,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behavior_types import TYPES
-from engage_hri.schemas.behaviors import BlockBehavior, Event, TurnSignal, Wait
+from engage_hri.schemas.behaviors import EVENT_KINDS, BlockBehavior, Event, TurnSignal, Wait
 from engage_hri.schemas.blocks import WarningKind
 from engage_hri.schemas.body import (
     BehaviorOutcome,
@@ -354,7 +354,7 @@ class BehaviorRun:
         """
         block, now = self._block, self._block.bus.now()
         starts = [Point(id, "start") for id in event.needs if id in block.decisions.plan.chains]
-        if not starts or event.kind == "backchannel":
+        if not starts or not EVENT_KINDS[event.kind].is_answered:
             return now
         if not any(start in block.decisions.facts.reached for start in starts):
             awaited = [block.futures.reached(start) for start in starts]

@@ -11,8 +11,10 @@ stand in one order, from what is certain to what is likely:
 4. the gaze: whose face the speaker looks at for most of the speech. In groups of four, whom a speaker looks at is in
    77 of 100 looks the addressee (Vertegaal and others, CHI 2001). People also look away while they think, so that no
    look at a face says nothing;
-5. an answer goes to who has just spoken to the speaker;
-6. more words go to those to whom the words before went.
+5. an answer goes to who has just spoken to the speaker, unless the speaker has answered since; and to the robot as
+   long as it waits for the speaker's answer;
+6. more words go to those to whom the words before went. A sound of which no words come, where they would have come,
+   is no more words: who has just answered the robot laughs at what a neighbor says.
 
 If none of them finds anybody, it is not known, and nothing follows from it. The gaze is known when the speech is
 over, the words later still. Rules 1 to 3 decide as soon as they apply; the others at the end.
@@ -24,13 +26,14 @@ from msgspec import Struct, field
 
 from engage_hri.schemas.units import Probability, Seconds
 
-JUST_SPOKEN: Seconds = 5.0
-"""Time after somebody's words in which what the other says is still about them. Ours."""
+JUST_SPOKEN: Seconds = 6.0
+"""Time after somebody's words in which what the other says is still about them: as long as people take to answer
+(`recognition.adjacency_pair_limit`)."""
 SHORT_CALL = 3
 """Number of words up to which a name at the end calls somebody. Ours."""
 Addressees = frozenset[str]
 NOBODY: Addressees = frozenset()
-EVERYBODY: Addressees = frozenset(("",))
+WHOEVER: Addressees = frozenset(("",))
 """Of a speech of the robot of which nobody has said to whom it is."""
 
 
@@ -43,7 +46,7 @@ class Spoken(Struct, kw_only=True):
     until: Seconds | None = None
 
     def is_to(self, actor: str) -> bool:
-        return self.to is EVERYBODY or (self.to is not None and actor in self.to)
+        return self.to is WHOEVER or (self.to is not None and actor in self.to)
 
     def is_just_before(self, at: Seconds) -> bool:
         """True if a speech that begins at `at` comes during this one, or soon after it."""
@@ -111,16 +114,23 @@ def certain(
     return None if company and not is_line else frozenset((robot,))
 
 
-def likely(speech: OwnSpeech, spoken: Iterable[Spoken]) -> Addressees:
-    """Addressees by rules 4 to 6, once the speech is over, or so far. spoken: what was said before, by all."""
+def likely(speech: OwnSpeech, spoken: Iterable[Spoken], *, awaited_by: Addressees, is_noise: bool) -> Addressees:
+    """Addressees by rules 4 to 6, once the speech is over, or so far.
+
+    spoken: what was said before, by all. awaited_by: who has asked the speaker, and still waits for the answer.
+    is_noise: no words of it have come, where they would have come.
+    """
     if face := speech.faces.most(speech.since):
         return frozenset((face,))
     recent = [each for each in spoken if each.is_just_before(speech.since) and each.since < speech.since]
-    asked = max((each for each in recent if each.is_to(speech.actor)), key=_since, default=None)
-    if asked is not None:
-        return frozenset((asked.actor,))
-    own = max((each for each in recent if each.actor == speech.actor), key=_since, default=None)
-    return NOBODY if own is None or own.to is None else own.to
+    last = max(
+        (each for each in recent if speech.actor == each.actor or each.is_to(speech.actor)), key=_since, default=None
+    )
+    if last is None:
+        return awaited_by
+    if last.actor != speech.actor:
+        return frozenset((last.actor,))
+    return NOBODY if is_noise or last.to is None else last.to
 
 
 def _since(spoken: Spoken) -> Seconds:

@@ -12,6 +12,7 @@ from engage_hri.services.recognition.events.machine import (
     EventWriter,
     Machine,
     OngoingEvent,
+    SpeechStart,
     TransitionRow,
     table,
 )
@@ -49,6 +50,11 @@ TABLE = table(
     TransitionRow(RESPONDING, "supersede", IDLE, ("completed",)),
     TransitionRow(RESPONDING, "person_gone", IDLE, ("completed",)),
 )
+
+
+def _spoken(person: str, action: Action, at: Seconds) -> tuple[SpeechStart, ...]:
+    """Speech of which a turn consists that a person has begun with an action; none if it is wordless."""
+    return (SpeechStart(person, at),) if action == "speak" else ()
 
 
 class AdjacencyPair(Machine):
@@ -205,15 +211,17 @@ class AdjacencyPair(Machine):
     @property
     def question(self) -> Question | None:
         """The robot's question that waits for an answer, its turn being over; None: none does."""
-        if self.state != ROBOT_WAITING or self._turn_end is None or self.event is None or self.deadline is None:
+        if self.state != ROBOT_WAITING or self._turn_end is None or self.event is None:
             return None
-        return Question(self.event.accept, self._turn_end, self.deadline)
+        until = self.deadline
+        return None if until is None else Question(self.event.accept, self._turn_end, until)
 
     def other_answers(self, person: str, action: Action, at: Seconds) -> None:
         """Take the answer of somebody who was not asked: it is no failure of who was."""
         if self.event is not None and self.question is not None:
             self.event.response, self.event.answered_by = action, person
             self.event.delay = at - self.question.since
+            self.event.spoken = _spoken(person, action, at)
             self.step("other_answers", at)
 
     def answered_for_all(self, answered: OngoingEvent, at: Seconds) -> None:
@@ -222,6 +230,7 @@ class AdjacencyPair(Machine):
         if event is None or event is answered or not self.is_turn(answered.turn) or self.state != ROBOT_WAITING:
             return
         event.response, event.answered_by, event.delay = answered.response, answered.answered_by, answered.delay
+        event.spoken = answered.spoken
         is_asked = answered.answered_by == answered.responder
         self.step("one_of_several_answers" if is_asked else "other_answers", at)
 
@@ -242,7 +251,7 @@ class AdjacencyPair(Machine):
         if self.event is None or not (is_first or self._is_earlier_answer(action, at)):
             return False
         self.event.rests_on(confidence)
-        self.event.spoken = (at,) if action == "speak" else ()
+        self.event.spoken = _spoken(self.event.responder, action, at)
         if is_first:
             self._answer("human_answers", action, at)
         else:
@@ -261,7 +270,7 @@ class AdjacencyPair(Machine):
         self.forget_unanswered()
         event.rests_on(confidence)
         event.response, event.delay = action, at - self._turn_end
-        event.spoken = (at,) if action == "speak" else ()
+        event.spoken = _spoken(event.responder, action, at)
         self._writer.publish(event, "failed", at, retold=True)
         return True
 
@@ -294,8 +303,8 @@ class AdjacencyPair(Machine):
             return False
         self._asked_with = action
         self._turn_end = None
-        if action == "speak" and self.event is not None:
-            self.event.spoken = (*self.event.spoken, at)
+        if self.event is not None:
+            self.event.spoken += _spoken(self.event.initiator, action, at)
         self.step("turn_goes_on", at)
         return True
 

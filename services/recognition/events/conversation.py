@@ -14,7 +14,7 @@ from engage_hri.services.recognition.events.backchannel import BRIEF, UNDECIDED,
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.limits import in_time
 from engage_hri.services.recognition.events.listener_sign import WORDS_WAIT, ListenerSign, SignPart
-from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent
+from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent, SpeechStart
 from engage_hri.services.recognition.events.scene import SessionScene
 from engage_hri.services.text.listening import is_listening, says_words
 
@@ -80,14 +80,13 @@ class Conversation:
     @property
     def _pair_deadline(self) -> Seconds | None:
         """Deadline of the pair; None while speech of anybody that began in time may yet turn out to be the answer."""
-        at, speeches = self.pair.deadline, self._sign.speeches if self._sign is not None else []
-        if at is None:
+        pair, sign, at = self.pair, self._sign, self.pair.deadline
+        if at is None or not pair.may_be_answered:
+            return at
+        began_in_time = sign is not None and any(in_time(speech.since, at) for speech in sign.speeches)
+        if began_in_time and pair.may_be_answered_with("speak"):
             return None
-        began_in_time = any(in_time(speech.since, at) for speech in speeches)
-        if began_in_time and self.pair.may_be_answered_with("speak"):
-            return None
-        question = self.pair.question
-        return None if question is not None and self._scene.may_be_answered(self.id, question.until) else at
+        return None if pair.question is not None and self._scene.may_be_answered(self.id, at) else at
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         for pair in self._pairs():
@@ -182,7 +181,7 @@ class Conversation:
     @property
     def _is_worded(self) -> bool:
         """True if words of what the person says now may come, and would decide what it is."""
-        return self.robot_holds_floor and self.id in self._scene.worded
+        return self.robot_holds_floor and self._scene.is_worded
 
     def _sign_is_due(self, at: Seconds) -> None:
         """Decide the sign: its speech has become too long for a backchannel, or its words have not come."""
@@ -213,10 +212,10 @@ class Conversation:
             return  # a point in the robot's turn directs the gaze, and says nothing
         event = self._backchannel(self._scene.robot, self.id, sign.since, sign.confidence)
         for speech in sign.speeches:
-            is_noise = self.id in self._scene.worded and not says_words(self._writer.text_of(self.id, speech.since))
+            is_noise = self._scene.is_worded and not says_words(self._writer.text_of(self.id, speech.since))
             self._writer.interject(self.id, speech.since, "noise" if is_noise else "backchannel", until)
         if sign.speeches:
-            event.spoken = tuple(speech.since for speech in sign.speeches)
+            event.spoken = tuple(SpeechStart(self.id, speech.since) for speech in sign.speeches)
             self._brief = sign.speeches[-1].since, sign.speeches[-1].until
         self.own_backchannel.speaks(event)
         self.own_backchannel.ends(until)
@@ -305,7 +304,7 @@ class Conversation:
             event = OngoingEvent(
                 kind="adjacency_pair", initiator=self.id, responder=self._scene.robot, started=at,
                 limit=self._config.adjacency_pair_limit, confidence=confidence,
-                spoken=(at,) if action == "speak" else (),
+                spoken=(SpeechStart(self.id, at),) if action == "speak" else (),
             )  # fmt: skip
             pair.human_asks(event, action)
         if action == "speak" and self.speaks_since is None and self.silent_since is not None:
@@ -397,7 +396,7 @@ class Conversation:
             self._floor_is_free(at)
 
     def withdraw(self, event: OngoingEvent, at: Seconds, *, is_orphan: bool) -> None:
-        """Withdraw a pair of the robot; see `PersonRecognition.withdraw`."""
+        """Withdraw a pair of the robot; see `Talk.withdraw`."""
         if self.pair.event is event and (self.pair.robot_holds_turn or not is_orphan):
             self.pair.abort(at)
 

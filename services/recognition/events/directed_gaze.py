@@ -1,21 +1,25 @@
 """Directed gaze: one looks or points at objects, so that the other looks there too. Thesis 2.2.1.
 
 The initiator may look away before the responder arrives, most of all when pointing; so the robot's own gaze
-matters only for the length of the shared phase. If the person looks there first, while the robot's head is still on
-its way, the shared phase begins when the head arrives.
+matters only for the length of the shared phase. If the robot points while its head is still on its way, the shared
+phase begins when the head arrives.
 """
 
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, TransitionRow, table
-from engage_hri.services.recognition.events.shared_gaze import SharedGaze
+from engage_hri.services.recognition.events.shared_gaze import ROBOT_COMING, SharedGaze
 
 ROBOT_DIRECTING, HUMAN_DIRECTING, SHARED = "robot_directing", "human_directing", "shared"
 
 TABLE = table(
-    TransitionRow(IDLE, "robot_directs", ROBOT_DIRECTING, ("started",)),
-    TransitionRow(IDLE, "robot_directs_shared", SHARED, ("started", "succeeded")),
+    TransitionRow(IDLE, "robot_asks", ROBOT_COMING),
     TransitionRow(IDLE, "human_directs", HUMAN_DIRECTING, ("started",)),
     TransitionRow(IDLE, "human_directs_shared", SHARED, ("started", "succeeded")),
     TransitionRow(IDLE, "human_directs_in_vain", IDLE, ("started", "preempted")),
+    TransitionRow(ROBOT_COMING, "robot_directs", ROBOT_DIRECTING, ("started",)),
+    TransitionRow(ROBOT_COMING, "robot_directs_shared", SHARED, ("started", "succeeded")),
+    TransitionRow(ROBOT_COMING, "person_gone", IDLE, ("started", "failed")),
+    TransitionRow(ROBOT_COMING, "withdraw", IDLE, ("started", "withdrawn")),
+    TransitionRow(ROBOT_COMING, "supersede", IDLE, ("started", "superseded")),
     TransitionRow(ROBOT_DIRECTING, "human_follows", SHARED, ("succeeded",)),
     TransitionRow(ROBOT_DIRECTING, "robot_leaves", ROBOT_DIRECTING),
     TransitionRow(ROBOT_DIRECTING, "limit", IDLE, ("failed",)),

@@ -8,6 +8,7 @@ anchor may never come, if its behavior was dropped. So the wait ends with the bl
 
 import math
 from collections.abc import Iterable
+from functools import lru_cache
 
 from engage_hri.schemas.behavior_types import canonical_sync
 from engage_hri.schemas.references import BLOCK_ITSELF, SyncRef
@@ -25,6 +26,7 @@ def in_time(at: Seconds, limit: Seconds) -> bool:
     return at <= limit + ROUNDING
 
 
+@lru_cache(BLOCKS_KEPT)
 def anchor(reference: str) -> tuple[str, Seconds] | None:
     """Sync point that a reference means, and its offset: `g:strokeStart+0.5` -> `g:stroke_start`, 0.5.
 
@@ -70,9 +72,10 @@ class Blocks:
 
 
 class LimitClock:
-    """Clock of a time limit: `limit` seconds from the latest of `start` and the anchors.
+    """Clock of a time limit: `limit` seconds from the latest of its beginning and the anchors.
 
-    patience: seconds after the limit for which an anchor is waited for, as long as its block has not ended.
+    start: time from which on it may begin. It begins when the target is shown. patience: seconds after the limit for
+    which an anchor is waited for, as long as its block has not ended.
     """
 
     def __init__(
@@ -83,6 +86,8 @@ class LimitClock:
         self._from = start
         self._not_before = start
         self._waiting = dict(filter(None, map(anchor, anchors)))
+        self.shown_at = None if self._waiting else start
+        """Time when the initiator has shown the target; None: not yet. Without anchors nobody knows, so at once."""
 
     @property
     def waiting(self) -> tuple[str, ...]:
@@ -99,9 +104,19 @@ class LimitClock:
     def realised(self, name: str, at: Seconds) -> None:
         if name in self._waiting:
             self._from = max(self._from, at + self._waiting.pop(name))
+            if not self._waiting:
+                self.show(at)
 
     def stop_waiting(self, at: Seconds) -> None:
         """Give up the anchors that have not come, for the block ended at `at`."""
         if self._waiting:
             self._waiting.clear()
             self._not_before = max(self._not_before, at)
+            self.show(at)
+
+    def show(self, at: Seconds) -> Seconds:
+        """Take that the target is shown. Returns the time at which it first was."""
+        if self.shown_at is None:
+            self.shown_at = max(at, self._not_before)
+            self._from = max(self._from, self.shown_at)
+        return self.shown_at

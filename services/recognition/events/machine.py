@@ -1,4 +1,4 @@
-"""The base of the four recognizers: a transition table as data, the ongoing event, and the writer of its changes.
+"""The base of all recognizers: a transition table as data, the ongoing event, and the writer of its changes.
 
 A row says to which state an input leads, and which changes of the connection event are published on the way.
 Guards are part of the input's name (`robot_directs_shared`), so that table and diagram are complete.
@@ -10,7 +10,7 @@ from typing import ClassVar, NamedTuple
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.behaviors import Action, Cause, EventKind
+from engage_hri.schemas.behaviors import EVENT_KINDS, Action, Cause, EventKind
 from engage_hri.schemas.recognition import (
     ENDINGS,
     ConnectionEvent,
@@ -49,9 +49,6 @@ IDLE = "idle"
 DECISIONS: frozenset[EventState] = frozenset({"succeeded", "failed", "preempted", "withdrawn", "superseded"})
 DECIDED: frozenset[EventState] = DECISIONS | {"lost"}
 """States that answer a request."""
-PREFIX: Mapping[EventKind, str] = {
-    "directed_gaze": "dg", "mutual_facial_gaze": "mfg", "adjacency_pair": "ap", "backchannel": "bc",
-}  # fmt: skip
 
 
 class UndefinedTransition(Exception):
@@ -76,6 +73,13 @@ def table(*rows: TransitionRow) -> Table:
     if len(by_input) != len(rows):
         raise ValueError("two rows for the same state and input")
     return by_input
+
+
+class SpeechStart(NamedTuple):
+    """A speech of a person, by its start."""
+
+    actor: str
+    since: Seconds
 
 
 class OngoingEvent(Struct, kw_only=True):
@@ -107,8 +111,8 @@ class OngoingEvent(Struct, kw_only=True):
     changed: Seconds | None = None
     is_former: bool = False
     """True if a former life of recognition has told its start already. Its delay is not known."""
-    spoken: tuple[Seconds, ...] = ()
-    """Starts of the person's speeches that it consists of: its words are theirs."""
+    spoken: tuple[SpeechStart, ...] = ()
+    """People's speeches that it consists of: its words are theirs."""
 
     def rests_on(self, confidence: Probability) -> None:
         """Count one more observation, of this confidence."""
@@ -126,12 +130,12 @@ class EventWriter:
         self.effects: list[Effect] = []
         self._clock = clock
         self._session = session
-        self._count: dict[EventKind, int] = dict.fromkeys(PREFIX, 0)
+        self._count: dict[EventKind, int] = dict.fromkeys(EVENT_KINDS, 0)
         self._open: dict[str, OngoingEvent] = {}
         """Published events that have not ended, by id."""
         self._words_patience = words_patience
-        self._texts: Latest[tuple[str, Seconds], str] = Latest(TEXTS_KEPT)
-        """Words of speeches, by person and start."""
+        self._texts: Latest[SpeechStart, str] = Latest(TEXTS_KEPT)
+        """Words of speeches."""
         self._spoken: Latest[str, tuple[OngoingEvent, ConnectionEvent]] = Latest(TEXTS_KEPT)
         """Events with speech of a person, each as it was last told."""
         self.answered: list[tuple[OngoingEvent, Seconds]] = []
@@ -152,7 +156,7 @@ class EventWriter:
         """
         if not event.id:
             self._count[event.kind] += 1
-            event.id = f"{self._session}{PREFIX[event.kind]}-{self._count[event.kind]}"
+            event.id = f"{self._session}{EVENT_KINDS[event.kind].prefix}-{self._count[event.kind]}"
         at = event.changed = max(at, event.started if event.changed is None else event.changed)
         if state == "failed" and not retold:
             event.delay = at - event.started
@@ -198,9 +202,9 @@ class EventWriter:
 
     def understand(self, person: str, speech: Seconds, text: str, at: Seconds) -> None:
         """Take the words of a speech, known at `at`. Events that consist of it are told again if they have others."""
-        self._texts[person, speech] = text
+        self._texts[SpeechStart(person, speech)] = text
         for event, told in tuple(self._spoken.values()):
-            if speech not in event.spoken or person not in (event.initiator, event.responder):
+            if (person, speech) not in event.spoken:
                 continue
             words = self._words_of(event)
             is_too_late = event.id not in self._open and at > (event.changed or at) + self._words_patience
@@ -213,7 +217,7 @@ class EventWriter:
 
     def text_of(self, person: str, speech: Seconds) -> str:
         """Words of a speech, as far as they are known; "": none."""
-        return self._texts.get((person, speech), "")
+        return self._texts.get(SpeechStart(person, speech), "")
 
     def _forget_spoken(self, at: Seconds) -> None:
         """Forget the events that are not told again, whatever may become known of their words."""
@@ -224,11 +228,7 @@ class EventWriter:
             del self._spoken[id]
 
     def _words_of(self, event: OngoingEvent) -> str:
-        if not event.spoken:
-            return ""
-        pair = (event.initiator, event.responder)
-        texts = (self._texts.get((actor, speech), "") for speech in event.spoken for actor in pair)
-        return " ".join(filter(None, texts))
+        return " ".join(filter(None, (self._texts.get(speech) for speech in event.spoken)))
 
     def has_open(self, person: str) -> bool:
         """True if an event with `person` is open."""

@@ -1,21 +1,25 @@
 """Mutual facial gaze: each looks at the other's face. Thesis 2.2.2.
 
-The robot asks for it when its head begins to move. That the robot turns away counts only after its gaze has been on
-the face since the request; before that its gaze is still on the way.
+The robot asks for it when its head begins to move, and it starts when the head is there. That the robot turns away
+counts only after its gaze has been on the face since the request; before that its gaze is still on the way.
 """
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.events.machine import IDLE, TransitionRow, table
-from engage_hri.services.recognition.events.shared_gaze import SharedGaze
+from engage_hri.services.recognition.events.shared_gaze import ROBOT_COMING, SharedGaze
 
 ROBOT_WAITING, HUMAN_WAITING, MUTUAL = "robot_waiting", "human_waiting", "mutual"
 
 TABLE = table(
-    TransitionRow(IDLE, "robot_looks", ROBOT_WAITING, ("started",)),
-    TransitionRow(IDLE, "robot_looks_mutual", MUTUAL, ("started", "succeeded")),
+    TransitionRow(IDLE, "robot_asks", ROBOT_COMING),
     TransitionRow(IDLE, "human_looks", HUMAN_WAITING, ("started",)),
     TransitionRow(IDLE, "human_looks_mutual", MUTUAL, ("started", "succeeded")),
     TransitionRow(IDLE, "human_looks_in_vain", IDLE, ("started", "preempted")),
+    TransitionRow(ROBOT_COMING, "robot_looks", ROBOT_WAITING, ("started",)),
+    TransitionRow(ROBOT_COMING, "robot_looks_mutual", MUTUAL, ("started", "succeeded")),
+    TransitionRow(ROBOT_COMING, "person_gone", IDLE, ("started", "failed")),
+    TransitionRow(ROBOT_COMING, "withdraw", IDLE, ("started", "withdrawn")),
+    TransitionRow(ROBOT_COMING, "supersede", IDLE, ("started", "superseded")),
     TransitionRow(ROBOT_WAITING, "human_answers", MUTUAL, ("succeeded",)),
     TransitionRow(ROBOT_WAITING, "limit", IDLE, ("failed",)),
     TransitionRow(ROBOT_WAITING, "robot_leaves", IDLE, ("withdrawn",)),
@@ -48,5 +52,5 @@ class MutualFacialGaze(SharedGaze):
             self._part("directed_gaze_begins", at)
         elif by_robot and self._asked is not None:
             self._drop("withdrawn", at)
-        elif self.state == ROBOT_WAITING and by_robot:
+        elif self.state in (ROBOT_COMING, ROBOT_WAITING) and by_robot:
             self.step("withdraw", at)

@@ -7,7 +7,7 @@ while, in case they come back.
 from collections.abc import Callable
 from functools import partial
 
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import FORGOTTEN_AFTER, Deadlines
 from engage_hri.services.recognition.config import RecognitionConfig
@@ -31,8 +31,10 @@ class People:
         self._unknown: dict[str, Seconds] = {}
         self._asked: set[str] = set()
         """`scene.unknown` and `scene.asked` when the deadlines of those who were asked were last updated."""
-        self.touched: set[str] = set()
-        """Persons whose contact with the robot may have changed since somebody emptied this."""
+        self._touched: set[str] = set()
+        """Persons whose contact with the robot may have changed since somebody has asked for contacts."""
+        self._contacts: dict[str, Probability | None] = {}
+        """Contact of each person as it was last told."""
         self._silences = 0
         """`scene.silences` when the deadlines of all were last updated."""
         self._scene = scene
@@ -87,7 +89,8 @@ class People:
         self._here.pop(id, None)
         self._unseen.pop(id, None)
         self._scene.forget_person(id)
-        self.touched.discard(id)
+        self._touched.discard(id)
+        self._contacts.pop(id, None)
         del self.persons[id]
         self._writer.effects.append(PersonForgotten(id))
         self._follow(now)
@@ -100,6 +103,7 @@ class People:
         self.lose_track(before, at)
         is_found = before.presence.here and before.presence.reported
         self._drop(other, at, at)
+        self._contacts.pop(kept, None)  # what was told of the other may be taken for it
         self._scene.join(other, kept)
         gazes = [self._scene.gaze, *(person.gaze for person in self.persons.values())]
         for gaze in gazes:
@@ -118,6 +122,16 @@ class People:
         self._scene.stops(person.id, at)
         self._update(fresh)
         self._follow(at)
+
+    def contacts(self) -> dict[str, Probability | None]:
+        """Contact of each person for whom it has changed since the last call."""
+        touched, told = self._touched, self._contacts
+        if not touched:
+            return {}
+        changed = {id: now for id in touched if (now := self.persons[id].contact) != told.get(id)}
+        touched.clear()
+        told |= changed
+        return changed
 
     # -- steps ---------------------------------------------------------------------------------------------
 
@@ -160,13 +174,14 @@ class People:
         """
         scene = self._scene
         self._tell_taken_up(at)
-        while (self._unknown, self._asked) != (scene.unknown, scene.asked):
+        while self._unknown != scene.unknown or self._asked != scene.asked:
             self._unknown, self._asked = {**scene.unknown}, {*scene.asked}
             for id in [*scene.questions]:
                 self._update(self.persons[id])
-            for id in sorted(self._unknown, key=lambda id: (self._unknown[id], id)):
-                self._apply(self.persons[id], at, lambda person: person.talk.go_on(at))
-                self._tell_taken_up(at)
+            for id in sorted(self._unknown, key=lambda id: scene.place(id, self._unknown[id])):
+                if self.persons[id].talk.may_go_on(at):
+                    self._apply(self.persons[id], at, lambda person: person.talk.go_on(at))
+                    self._tell_taken_up(at)
         if self._silences != scene.silences:
             self._silences = scene.silences
             self._looks_may_direct(at)
@@ -186,7 +201,7 @@ class People:
     def _looks_may_direct(self, at: Seconds) -> None:
         """Update the deadlines of those whose looks may direct the robot's now, for what all share has changed."""
         for person in list(self._here.values()):
-            if person.look_directs_at is not None:
+            if person.gazes.look_directs_at is not None:
                 self._apply(person, at, lambda person: None)
 
     def _apply(self, person: PersonRecognition, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
@@ -209,7 +224,7 @@ class People:
             del scene.questions[id]
         (scene.asked.add if person.talk.is_asked else scene.asked.discard)(id)
         self.agenda.set(id, person.deadline)
-        self.touched.add(id)
+        self._touched.add(id)
         presence = person.presence
         here, was_here = presence.here, id in self._here
         (scene.found.add if here and presence.reported else scene.found.discard)(id)

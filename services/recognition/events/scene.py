@@ -139,8 +139,8 @@ class SessionScene:
         """Those of whom perception reports that it sees them."""
         self.names: dict[str, str] = {robot.casefold(): robot}
         """Actor ids by what people call them."""
-        self.worded: set[str] = set()
-        """People whose words somebody tells."""
+        self.is_worded = False
+        """True once somebody has told spoken words, of whomever: a recognizer hears all voices."""
         self.tells_addressees = False
         """True if perception has ever told to whom somebody speaks."""
         self.told_addressees: Latest[tuple[str, Seconds], Addressees] = Latest(SPOKEN_KEPT)
@@ -204,7 +204,6 @@ class SessionScene:
     def forget_person(self, person: str) -> None:
         self.present.discard(person)
         self.found.discard(person)
-        self.worded.discard(person)
         self.names = {name: id for name, id in self.names.items() if id != person}
 
     def join(self, other: str, kept: str) -> None:
@@ -252,8 +251,14 @@ class SessionScene:
 
     def is_contested(self, person: str, at: Seconds) -> bool:
         """True if the robot asks somebody, and another began to speak before this, it is not known yet to whom."""
-        unknown = ((since, who) for who, since in self.unknown.items() if who != person)
-        return bool(self.asked) and any(each < (at, person) for each in unknown)
+        if not self.asked or not self.unknown:
+            return False
+        place = self.place(person, at)
+        return any(self.place(who, since) < place for who, since in self.unknown.items())
+
+    def place(self, person: str, at: Seconds) -> tuple[Seconds, bool, str]:
+        """Place of what a person begins to say in the order in which people are heard: who is asked comes first."""
+        return at, person not in self.asked, person
 
     def may_be_answered(self, person: str, until: Seconds) -> bool:
         """True if somebody else has begun to speak by then, of whom it is not known yet to whom it is."""

@@ -11,7 +11,7 @@ before it, at its own time. An answer exactly at the limit still counts.
 from collections.abc import Callable, Container, Set
 from typing import get_args
 
-from engage_hri.schemas.behaviors import Action, Event, TurnSignal
+from engage_hri.schemas.behaviors import EVENT_KINDS, Action, Event, TurnSignal
 from engage_hri.schemas.blocks import BlockProgress, SyncPointProgress
 from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.faults import Fault
@@ -22,7 +22,7 @@ from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.addressing import EVERYBODY, NOBODY, Addressees, Spoken
+from engage_hri.services.recognition.events.addressing import NOBODY, WHOEVER, Addressees, Spoken
 from engage_hri.services.recognition.events.conversation import TURN_PATIENCE
 from engage_hri.services.recognition.events.history import ActionHistory, Latest
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock, anchor
@@ -99,19 +99,15 @@ class Session:
     def floor(self) -> list[tuple[str, Seconds, Addressees]]:
         """All speeches that go on, the first first: who speaks, since when, and to whom (empty: not known yet)."""
         said = self.scene.robot_spoken
-        speeches = [] if said is None else [(self.robot, said.since, (said.to or NOBODY) - EVERYBODY)]
+        speeches = [] if said is None else [(self.robot, said.since, (said.to or NOBODY) - WHOEVER)]
         for person in self.persons.values():
             if person.presence.here and person.talk.speaks_since is not None:
                 speeches.append((person.id, person.talk.speaks_since, person.talk.speaks_to))
         return sorted(speeches, key=lambda each: (each[1], each[0]))
 
     def contacts(self) -> dict[str, Probability | None]:
-        """Contact with each person for whom it may have changed since the last call."""
-        if not self._people.touched:
-            return {}
-        touched, self._people.touched = self._people.touched, set()
-        persons = self._people.persons
-        return {id: persons[id].contact for id in touched if id in persons}
+        """Contact with each person for whom it has changed since the last call."""
+        return self._people.contacts()
 
     @property
     def busy(self) -> Set[str]:
@@ -152,7 +148,7 @@ class Session:
     def feed(self, observation: Observation | Covered, at: Seconds) -> list[Effect]:
         """Take an observation of what happened at `at`. Slightly late or repeated ones are put right or ignored."""
         self._advance_before(at)
-        match observation:
+        match observation:  # what comes most often first
             case ActionBegan(actor=self.robot):
                 self._robot_begins(observation, at)
             case ActionEnded(actor=self.robot):
@@ -161,6 +157,14 @@ class Session:
                 self._people.observe(actor, at, lambda person: person.begins(observation, at))
             case ActionEnded(actor=actor) if actor in self.persons:
                 self._people.observe(actor, at, lambda person: person.ends(observation, at))
+            case World():
+                self._people.see(observation, at)
+            case SyncPointProgress(block=block):
+                name = self.blocks.realised(block, observation.behavior, observation.sync, at)
+                asked = {event.responder for event in self._live.values() if event.block == block}
+                for id in asked & self.persons.keys():
+                    if self.persons[id].waits_for(block, name):
+                        self._people.apply(id, at, lambda person: person.point_realised(block, name, at))
             case GoesOn(began=ActionBegan(actor=self.robot)):
                 self._robot_goes_on(observation.began, observation.since, at)
             case GoesOn(began=began, since=since):
@@ -179,12 +183,6 @@ class Session:
                 self._signal(observation, at)
             case Cancel():
                 self._cancel(observation, at)
-            case SyncPointProgress(block=block):
-                name = self.blocks.realised(block, observation.behavior, observation.sync, at)
-                asked = {event.responder for event in self._live.values() if event.block == block}
-                for id in asked & self.persons.keys():
-                    if self.persons[id].waits_for(block, name):
-                        self._people.apply(id, at, lambda person: person.point_realised(block, name, at))
             case BlockProgress(block=str() as block, progress="start"):
                 self._block_begins(block, at)
             case BlockProgress(block=str() as block, progress="end"):
@@ -194,13 +192,11 @@ class Session:
             case HeadOwner(owner=owner):
                 self.scene.head_owner = owner
                 self._people.apply_to_all(
-                    at, lambda person: person.head_owner_changed(at), lambda person: person.has_gaze_event
+                    at, lambda person: person.gazes.head_owner_changed(at), lambda person: person.gazes.is_under_way
                 )
-            case World():
-                self._people.see(observation, at)
             case Covered():
                 self.scene.covered = observation
-                self._people.apply_to_all(at, lambda person: person.hands_changed())
+                self._people.apply_to_all(at, lambda person: person.gazes.hands_changed())
         return self._take()
 
     def resume(self, former: ConnectionEvent, at: Seconds) -> list[Effect]:
@@ -258,31 +254,26 @@ class Session:
     def _robot_begins(self, began: ActionBegan, at: Seconds) -> None:
         if not self._history.is_new(began, at):
             return
+        if began.action == "look":
+            if self.scene.gaze.begin(began.targets, at):
+                self._robot_gaze_changed(at)
+            return
+        self._robot_actions[began.behavior, began.action] = began
         match began.action:
-            case "look":
-                if self.scene.gaze.begin(began.targets, at):
-                    self._robot_gaze_changed(at)
             case "speak":
-                self._robot_actions[began.behavior, "speak"] = began
                 self._heard_at = None
                 if self.scene.robot_speaks_since is None:
                     self._robot_speaks(began, at)
                     listens = self.scene.is_listening(began.behavior)
                     self._say(began, at, lambda talk: talk.robot_speaks(at, listens=listens))
             case "nod" | "shake" | "point":
-                self._robot_actions[began.behavior, began.action] = began
                 listens = self.scene.is_listening(began.behavior)
                 self._say(began, at, lambda talk: talk.robot_gestures(began.action, at, listens=listens))
-                if began.action == "point":
-                    self._people.apply_to_all(
-                        at, lambda person: person.robot_points(began.targets, at), lambda person: person.directed
-                    )
+        self._people.apply_to_all(at, lambda person: person.robot_begins(began, at))
 
     def _robot_speaks(self, began: ActionBegan, at: Seconds) -> None:
         self.scene.speaks(self.robot)
-        self.scene.robot_spoken = Spoken(
-            actor=self.robot, since=at, to=self.addressees_of(began.behavior) or EVERYBODY
-        )
+        self.scene.robot_spoken = Spoken(actor=self.robot, since=at, to=self.addressees_of(began.behavior) or WHOEVER)
         self.scene.note_spoken(self.scene.robot_spoken)
 
     def _say(self, began: ActionBegan, at: Seconds, step: Step) -> None:
@@ -291,7 +282,7 @@ class Session:
         if to is None:
             self._tell("", at, step)
         else:
-            for actor in to:
+            for actor in sorted(to):
                 self._tell(actor, at, step)
 
     def addressees_of(self, behavior: str) -> Addressees | None:
@@ -330,23 +321,19 @@ class Session:
         self._say(began, at, lambda talk: talk.robot_goes_on(began.action, since))
 
     def _robot_ends(self, ended: ActionEnded, at: Seconds) -> None:
+        action = ended.action
         if not self._history.is_new(ended, at):
             return
-        self._robot_actions.pop((ended.behavior, ended.action), None)
-        match ended.action:
-            case "look":
-                self.scene.gaze.end(ended.targets, at)
-            case "speak":
-                speaks = any(action == "speak" for _, action in self._robot_actions)
-                if self.scene.robot_speaks_since is not None and not speaks:
-                    self.scene.robot_falls_silent(at)
-                    self._ends_in_talk(at, lambda talk: talk.robot_falls_silent(at))
-            case "nod" | "shake" | "point":
-                self._ends_in_talk(at, lambda talk: talk.robot_gesture_ends(ended.action, at))
-
-    def _ends_in_talk(self, at: Seconds, step: Step) -> None:
+        self._robot_actions.pop((ended.behavior, action), None)
+        if action == "look":
+            self.scene.gaze.end(ended.targets, at)
+            return
+        if action == "speak":
+            if self.scene.robot_speaks_since is None or any(each == "speak" for _, each in self._robot_actions):
+                return
+            self.scene.robot_falls_silent(at)
         self._people.apply_to_all(
-            at, lambda person: person.talk.take(at, step), lambda person: person.talk.is_under_way
+            at, lambda person: person.robot_stops(action, at), lambda person: person.is_involved
         )
 
     def _understand(self, words: Worded, at: Seconds) -> None:
@@ -354,7 +341,7 @@ class Session:
         if words.to is not None:
             self.scene.tells_addressees = True
             self.scene.told_addressees[words.actor, words.since] = words.to
-        self.scene.worded.add(words.actor)
+        self.scene.is_worded |= not words.is_line
         if words.text:
             self._writer.understand(words.actor, words.since, words.text, at)
         if words.actor in self.persons:
@@ -383,7 +370,9 @@ class Session:
                 self._robot_ends(ended, at)
 
     def _robot_gaze_changed(self, at: Seconds) -> None:
-        self._people.apply_to_all(at, lambda person: person.gaze_changed(at), lambda person: person.is_involved)
+        self._people.apply_to_all(
+            at, lambda person: person.gazes.gaze_changed(at), lambda person: person.gazes.is_under_way
+        )
 
     # -- requests -----------------------------------------------------------------------------------------------
 
@@ -396,10 +385,12 @@ class Session:
             self._writer.effects.append(Refused(id=request.id, fault=fault))
             return
         wanted = request.event
+        default = self.persons[wanted.responder].recognizer(wanted.kind).limit(wanted)
         event = OngoingEvent(
             kind=wanted.kind, initiator=self.robot, responder=wanted.responder, started=at, objects=wanted.objects,
             cause=wanted.cause, optional=wanted.optional, block=request.block, behavior=wanted.id, turn=wanted.turn,
-            request=request.id, limit=self._limit(wanted),
+            request=request.id, limit=None if default is None else wanted.limit or default,
+            accept=wanted.accept or ACCEPT,
         )  # fmt: skip
         self._writer.effects.append(Accepted(id=request.id, within=self._within(event, wanted)))
         self._live[request.id] = event
@@ -408,15 +399,9 @@ class Session:
 
     def _begin(self, person: PersonRecognition, event: OngoingEvent, wanted: Event) -> None:
         """Begin the robot's event with this person."""
-        match wanted.kind:
-            case "directed_gaze":
-                person.robot_directs(event, self._clock(event, wanted))
-            case "mutual_facial_gaze":
-                person.robot_looks_at_face(event, self._clock(event, wanted))
-            case "adjacency_pair":
-                self._ask(person, event, wanted)
-            case "backchannel":
-                self._announce_backchannel(person, event)
+        opens_turn = event.kind == "adjacency_pair"
+        ended = self._begins_turn(event) if opens_turn else self.blocks.ended.get(event.block)
+        person.recognizer(event.kind).robot_asks(event, self._clock(event, wanted), ended)
 
     def _fault_in(self, request: RequestEvent) -> Fault | None:
         event, where = request.event, f"{request.block}: {request.event.id}"
@@ -427,8 +412,9 @@ class Session:
         if not person.presence.here:
             reason = f"{event.responder!r} is not seen any more"
             return Fault(reason=reason, where=where, cause="gone", whose=event.responder)
-        if event.kind == "directed_gaze" and not event.objects:
-            return Fault(reason="directed gaze without objects", where=where)
+        kind = EVENT_KINDS[event.kind]
+        if kind.needs_objects and not event.objects:
+            return Fault(reason=f"{kind.title} without objects", where=where)
         unknown = [name for name in event.objects if not self.scene.knows(name)]
         if event.turn and event.turn in self._aborted_turns:
             reason = f"turn {event.turn!r} has been cut off"  # nobody but generation says so
@@ -439,29 +425,16 @@ class Session:
             return Fault(reason=f"limit must be greater than 0 s, not {event.limit}", where=where)
         return None
 
-    def _limit(self, wanted: Event) -> Seconds | None:
-        """Time that the responder has; None: nobody has to respond, for the responder's sign is the event."""
-        match wanted.kind:
-            case "directed_gaze":
-                return wanted.limit or self._config.directed_gaze_limit
-            case "mutual_facial_gaze":
-                return wanted.limit or self._config.mutual_facial_gaze_limit
-            case "adjacency_pair":
-                by_acting = "act" in (wanted.accept or ACCEPT)
-                return wanted.limit or (
-                    self._config.manipulation_limit if by_acting else self._config.adjacency_pair_limit
-                )
-            case "backchannel":
-                return None
-
     def _within(self, event: OngoingEvent, wanted: Event) -> Seconds:
         """Longest time from the robot's last deed to the decision, also if the turn's end or anchors never come."""
         offsets = [found[1] for text in wanted.anchors if (found := anchor(text)) is not None]
         limit = max(event.limit or 0.0, self._config.backchannel_limit)
         return limit + TURN_PATIENCE + max([0.0, *offsets]) + SETTLING
 
-    def _clock(self, event: OngoingEvent, wanted: Event) -> LimitClock:
-        assert event.limit is not None
+    def _clock(self, event: OngoingEvent, wanted: Event) -> LimitClock | None:
+        """Clock of the event's limit; None: it has none."""
+        if event.limit is None:
+            return None
         clock = LimitClock(event.started, event.limit, wanted.anchors, TURN_PATIENCE)
         for name in clock.waiting:
             if (realised := self.blocks.point(event.block, name)) is not None:
@@ -470,19 +443,16 @@ class Session:
             clock.stop_waiting(ended)
         return clock
 
-    def _ask(self, person: PersonRecognition, event: OngoingEvent, wanted: Event) -> None:
-        event.accept = wanted.accept or ACCEPT
-        at = event.started
+    def _begins_turn(self, event: OngoingEvent) -> Seconds | None:
+        """Note the first turn of a pair, and whether it is to others, too. Returns when it was over, if it is."""
         asked = [each for each in self._live.values() if each.kind == "adjacency_pair" and each.turn == event.turn]
         for each in asked if event.turn and len(asked) > 1 else ():
             each.is_to_several = True
-        self._speaks_to(person.id, event.block, at)
-        turn_end = self._ended_turns.get(event.turn) if event.turn else self.blocks.ended.get(event.block)
-        person.talk.robot_asks(event)
-        if turn_end is None:
+        self._speaks_to(event.responder, event.block, event.started)
+        ended = self._ended_turns.get(event.turn) if event.turn else self.blocks.ended.get(event.block)
+        if ended is None:
             self._opens(event.turn, event.responder)
-        else:
-            person.talk.take(at, lambda talk: talk.turn_ends(max(turn_end, at)))
+        return ended
 
     def _speaks_to(self, actor: str, block: str, at: Seconds) -> None:
         """Note another addressee of what the robot says in this block already: it has announced them one by one."""
@@ -502,18 +472,15 @@ class Session:
         if self._turn is not None and self._turn[0] == turn:
             self._turn = None
 
-    def _announce_backchannel(self, person: PersonRecognition, event: OngoingEvent) -> None:
-        """Begin the robot's backchannel, unless noticed already. The person holds the floor: it is the initiator."""
-        event.initiator, event.responder = person.id, self.robot
-        self.scene.listening_blocks[event.block] = None
-        ended = self.blocks.ended.get(event.block)
-        person.talk.take(event.started, lambda talk: talk.robot_announces(event, ended))
-
     def _cancel(self, cancel: Cancel, at: Seconds) -> None:
         event = self._live.pop(cancel.id, None)
         if event is not None and event.request == cancel.id:
             is_orphan = cancel.cause in ORPHANING
-            self._people.apply(event.responder, at, lambda person: person.withdraw(event, at, is_orphan=is_orphan))
+            self._people.apply(
+                event.responder,
+                at,
+                lambda person: person.recognizer(event.kind).withdraw(event, at, is_orphan=is_orphan),
+            )
 
     # -- turns and blocks ---------------------------------------------------------------------------------------
 

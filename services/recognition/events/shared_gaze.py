@@ -2,10 +2,11 @@
 
 Thesis 2.2.1-2. The names of states and inputs are data of the subclasses; their tables have the transitions.
 
-A look begins with its arrival, for both sides. A person may follow the words before the robot's head is there; the
-event succeeds when the robot shows its target, too. And two who look at each other meet once: if the robot asks for
-a look while the person's own look waits for it, the request waits for what becomes of that. If they meet, this is the
-event that was asked for; if they don't, the request begins an event of its own (decision 0187).
+A look begins with its arrival, for both sides. The robot asks before its head is there; the event starts when it
+shows its target (decision 0197). Who has followed the words by then was there at once: the delay is 0. And two who
+look at each other meet once: if the robot asks for a look while the person's own look waits for it, the request waits
+for what becomes of that. If they meet, this is the event that was asked for; if they don't, the request begins an
+event of its own (decision 0187).
 """
 
 from collections.abc import Callable, Iterator
@@ -16,6 +17,9 @@ from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.events.limits import LimitClock
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, Machine, OngoingEvent
 from engage_hri.services.recognition.events.scene import GazeState
+
+ROBOT_COMING = "robot_coming"
+"""State after the robot has asked, until it shows its target."""
 
 
 class _Asked(NamedTuple):
@@ -29,12 +33,12 @@ class SharedGaze(Machine):
     """A gaze event of one person and the robot: directed gaze or mutual facial gaze."""
 
     ROBOT_WAITS: ClassVar[str]
-    """State after the robot has begun, until the person joins."""
+    """State after the robot has shown its target, until the person joins."""
     HUMAN_WAITS: ClassVar[str]
     TOGETHER: ClassVar[str]
     """State of the shared phase."""
     ROBOT_BEGINS: ClassVar[str]
-    """Input when the robot begins; `<input>_<TOGETHER>` if the person looks there already."""
+    """Input when the robot shows its target; `<input>_<TOGETHER>` if the person looks there already."""
     HUMAN_BEGINS: ClassVar[str]
     """Input when the person begins; `<input>_<TOGETHER>`, or `<input>_in_vain` if the robot cannot answer."""
     ROBOT_JOINS: ClassVar[str]
@@ -44,7 +48,7 @@ class SharedGaze(Machine):
         super().__init__(writer)
         self.by_robot = False
         self._clock: LimitClock | None = None
-        self._robot_on = self._human_on = self._robot_came = self._robot_pointed = False
+        self._robot_on = self._human_on = self._robot_came = False
         self._shared_since: Seconds | None = None
         self._confidence: Probability = 1.0
         """Confidence of the person's present look."""
@@ -53,7 +57,7 @@ class SharedGaze(Machine):
 
     @property
     def deadline(self) -> Seconds | None:
-        if self._clock is None or self.state not in (self.ROBOT_WAITS, self.HUMAN_WAITS):
+        if self._clock is None or self.state not in (ROBOT_COMING, self.ROBOT_WAITS, self.HUMAN_WAITS):
             return None
         return self._clock.deadline
 
@@ -62,15 +66,10 @@ class SharedGaze(Machine):
         """True while both look there."""
         return self.state == self.TOGETHER and self._shared_since is not None
 
-    @property
-    def _is_shown(self) -> bool:
-        """True if the robot has shown its target: it looks or points there, or no anchor is waited for any more."""
-        return self._robot_came or self._robot_pointed or self._clock is None or not self._clock.waiting
-
     def expire(self, at: Seconds) -> None:
-        """Decide the event at its deadline: the limit has passed, or the robot has never shown its target."""
-        never_shown = self._clock is not None and self._clock.waiting
-        self.step("withdraw" if never_shown else "limit", at)
+        """Decide the event at its deadline: the limit has passed, or an anchor has never come."""
+        still_waits = self._clock is not None and self._clock.waiting
+        self.step("withdraw" if still_waits else "limit", at)
 
     # -- beginnings ---------------------------------------------------------------------------------------------
 
@@ -89,12 +88,12 @@ class SharedGaze(Machine):
             self._asked = _Asked(event, clock)
         else:
             self._close("supersede", at)
+            self._confidence = 1.0 if look is None else look.confidence
+            if robot_on:
+                clock.show(at)
             self._begin(event, clock, by_robot=True, robot_on=robot_on, human_on=look is not None)
-            if look is not None and self._is_shown:
-                self._join(f"{self.ROBOT_BEGINS}_{self.TOGETHER}", max(at, look.since), confidence=look.confidence)
-            else:
-                self._confidence = 1.0 if look is None else look.confidence
-                self.step(self.ROBOT_BEGINS, at)
+            self.step("robot_asks", at)
+            self._follow(at if look is None else max(at, look.since))
 
     def human_begins(
         self,
@@ -124,16 +123,27 @@ class SharedGaze(Machine):
     ) -> None:
         self.event, self._clock, self.by_robot = event, clock, by_robot
         self._robot_on = self._robot_came = robot_on
-        self._human_on, self._robot_pointed, self._shared_since = human_on, False, None
+        self._human_on, self._shared_since = human_on, None
 
     def step(self, given: str, at: Seconds) -> None:
-        """Take one transition. What the robot has asked for begins if the person's event has ended without it."""
+        """Take one transition. What the robot has asked for begins when it ends, at the latest.
+
+        If it has waited for the person's event, it goes its own way when that has ended without it.
+        """
+        if self.state == ROBOT_COMING:
+            self._start(at)
         super().step(given, at)
         if self.state == IDLE and self._asked is not None:
             (event, clock), self._asked = self._asked, None
             self._begin(event, clock, by_robot=True, robot_on=self._robot_on, human_on=self._human_on)
-            super().step(self.ROBOT_BEGINS, at)
+            super().step("robot_asks", at)
             self._follow(at)
+
+    def _start(self, at: Seconds) -> None:
+        """Let what the robot has asked for start when it is shown, or now at the latest."""
+        assert self.event is not None
+        assert self._clock is not None
+        self.event.started = self._clock.show(at)
 
     def _adopt(self, asked: OngoingEvent) -> None:
         """Let the present event be the one that the robot has asked for."""
@@ -144,7 +154,8 @@ class SharedGaze(Machine):
     def _drop(self, state: EventState, at: Seconds) -> None:
         """Tell of an event that was asked for, and will not begin any more."""
         assert self._asked is not None
-        event, self._asked = self._asked.event, None
+        (event, clock), self._asked = self._asked, None
+        event.started = clock.show(at)
         self._writer.publish(event, "started", at)
         self._writer.publish(event, state, at)
 
@@ -157,6 +168,8 @@ class SharedGaze(Machine):
         robot_left, human_left = self._robot_on and not robot_on, self._human_on and not human_on
         self._robot_on, self._human_on, self._confidence = robot_on, human_on, confidence
         self._robot_came = self._robot_came or robot_on
+        if robot_on and self._clock is not None:
+            self._clock.show(at)
         if self.state == self.ROBOT_WAITS and robot_left and not human_on:
             self.step("robot_leaves", at)
         elif self.state == self.HUMAN_WAITS and human_left and not robot_on:
@@ -168,8 +181,11 @@ class SharedGaze(Machine):
 
     def robot_points(self, at: Seconds) -> None:
         """Take a gesture of the robot that shows the target, whether or not it looks there."""
-        self._robot_pointed = True
-        self._follow(at)
+        if self.state == self.HUMAN_WAITS:
+            self._join(self.ROBOT_JOINS, at)
+        elif self._clock is not None:
+            self._clock.show(at)
+            self._follow(at)
 
     def realised(self, block: str, name: str, at: Seconds) -> None:
         """Take a realised sync point of a block of the robot: time limits may run from there."""
@@ -185,10 +201,17 @@ class SharedGaze(Machine):
             yield self._clock
 
     def _follow(self, at: Seconds) -> None:
-        """Let the responder join who is there, now that the initiator has shown where to look."""
-        if self.state == self.ROBOT_WAITS and self._human_on and self._is_shown:
+        """Start what the robot has shown, and let the responder join who is there."""
+        is_shown = self._clock is not None and self._clock.shown_at is not None
+        if self.state == ROBOT_COMING and is_shown:
+            self._start(at)
+            if self._human_on:
+                self._join(f"{self.ROBOT_BEGINS}_{self.TOGETHER}", at, confidence=self._confidence)
+            else:
+                self.step(self.ROBOT_BEGINS, at)
+        elif self.state == self.ROBOT_WAITS and self._human_on:
             self._join(self.HUMAN_JOINS, at, confidence=self._confidence)
-        elif self.state == self.HUMAN_WAITS and (self._robot_on or self._robot_pointed):
+        elif self.state == self.HUMAN_WAITS and self._robot_on:
             self._join(self.ROBOT_JOINS, at)
 
     def _join(self, given: str, at: Seconds, came: Seconds | None = None, confidence: Probability = 1.0) -> None:
@@ -235,7 +258,7 @@ class SharedGaze(Machine):
         if self.event is not None and concerns(self.event):
             if self._clock is not None:
                 self._clock.stop_waiting(at)
-            if self.state == self.ROBOT_WAITS and aborted:
+            if self.state in (ROBOT_COMING, self.ROBOT_WAITS) and aborted:
                 self.step("withdraw", at)
             elif self.state == self.TOGETHER and not self._robot_on:
                 self._part("part", at)

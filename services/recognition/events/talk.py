@@ -9,7 +9,8 @@ known late has happened early.
 from collections import deque
 from collections.abc import Callable, Iterator
 
-from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.behaviors import EVENT_KINDS, Action, Event
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.addressing import (
@@ -21,9 +22,11 @@ from engage_hri.services.recognition.events.addressing import (
     likely,
 )
 from engage_hri.services.recognition.events.conversation import Conversation
-from engage_hri.services.recognition.events.limits import ROUNDING
+from engage_hri.services.recognition.events.kinds import KindRecognizer, TimedStep
+from engage_hri.services.recognition.events.limits import ROUNDING, LimitClock
 from engage_hri.services.recognition.events.machine import EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import Question, SessionScene
+from engage_hri.services.text.listening import says_words
 
 LONGEST_UNKNOWN: Seconds = 3.0
 """Time after which it is decided to whom a speech is that still goes on, by the looks so far. Ours."""
@@ -35,13 +38,11 @@ No speech is longer (`LONGEST_SPEECH`). Ours."""
 Step = Callable[[Conversation], object]
 
 
-class Talk:
-    """Talk of one person with the robot."""
+class Talk(KindRecognizer):
+    """Talk of one person with the robot: adjacency pairs, and the backchannels of both."""
 
     def __init__(self, id: str, scene: SessionScene, config: RecognitionConfig, writer: EventWriter) -> None:
-        self.id = id
-        self._scene = scene
-        self._writer = writer
+        super().__init__(id, scene, config, writer)
         self._conversation = Conversation(id, scene, config, writer, robot_speaks=scene.robot_speaks_to(id))
         self._line: deque[tuple[Seconds, Step | OwnSpeech]] = deque()
         """What is not told yet, with its times. The first is a speech of which it is not known to whom it is."""
@@ -61,7 +62,7 @@ class Talk:
         return NOBODY if self._speech is None or self._speech.to is None else self._speech.to
 
     @property
-    def speaks_to_robot(self) -> bool:
+    def is_in_contact(self) -> bool:
         """True while the person says something that is known to be for the robot."""
         return self._speech is not None and self._speech.is_to(self._scene.robot)
 
@@ -90,12 +91,10 @@ class Talk:
 
     @property
     def deadlines(self) -> tuple[Seconds | None, ...]:
-        """Times of the `timed_steps`."""
         return (self._decided_at,) if self._line else self._conversation.deadlines
 
     @property
-    def timed_steps(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:
-        """Steps that are due by themselves, with their times."""
+    def timed_steps(self) -> Iterator[TimedStep]:
         if self._line:
             yield self._decided_at, self.go_on
         else:
@@ -120,7 +119,23 @@ class Talk:
             if speech.until is None:
                 speech.faces.turns(face, at)
 
-    def speaks(self, at: Seconds, confidence: Probability, face: str) -> None:
+    def begins(self, began: ActionBegan, at: Seconds, face: str) -> None:
+        action, confidence = began.action, began.confidence
+        match action:
+            case "speak":
+                self._speaks(at, confidence, face)
+            case "nod" | "shake" | "point":
+                self._shows(at, face, lambda talk: talk.gestures(action, at, confidence))
+            case "act":
+                self._shows(at, face, lambda talk: talk.manipulates(at, confidence))
+
+    def stops(self, action: Action, at: Seconds) -> None:
+        if action == "speak":
+            self._falls_silent(at)
+        else:
+            self.take(at, lambda talk: talk.action_ends(action, at))
+
+    def _speaks(self, at: Seconds, confidence: Probability, face: str) -> None:
         """Take the beginning of a speech. face: whose face the person looks at."""
         self._speech = speech = self._own_speech(at, confidence, face)
         speech.told = self._scene.told_to(self.id, at)
@@ -130,7 +145,7 @@ class Talk:
             speech.is_interjected = True
         self._queue(at, speech)
 
-    def falls_silent(self, at: Seconds) -> None:
+    def _falls_silent(self, at: Seconds) -> None:
         """Take the end of the speech that goes on."""
         speech, self._speech = self._speech, None
         if speech is None:
@@ -140,7 +155,7 @@ class Talk:
         self.take(at, lambda talk: talk.falls_silent(at) if speech.is_to(self._scene.robot) else None)
         self.go_on(at)
 
-    def shows(self, at: Seconds, face: str, step: Step) -> None:
+    def _shows(self, at: Seconds, face: str, step: Step) -> None:
         """Take a sign without words, which is to the robot unless the person looks at somebody else's face.
 
         Of who looks at nobody's it is to the robot if that has just spoken to the person.
@@ -194,10 +209,47 @@ class Talk:
         else:
             step(self._conversation)
 
-    def robot_asks(self, event: OngoingEvent) -> None:
-        """Take the robot's first turn."""
-        self._take_in_order(event.started, lambda talk: talk.robot_asks(event))
+    def limit(self, wanted: Event) -> Seconds | None:
+        if not EVENT_KINDS[wanted.kind].is_answered:
+            return None
+        return self._config.manipulation_limit if "act" in wanted.accept else self._config.adjacency_pair_limit
+
+    def robot_asks(self, event: OngoingEvent, clock: LimitClock | None, ended: Seconds | None) -> None:
+        """Take the robot's first turn, or the announcement of its backchannel."""
+        at = event.started
+        if event.kind == "backchannel":
+            # The person holds the floor: it is the initiator.
+            event.initiator, event.responder = self.id, self._scene.robot
+            self._scene.listening_blocks[event.block] = None
+            self.take(at, lambda talk: talk.robot_announces(event, ended))
+            return
+        self._take_in_order(at, lambda talk: talk.robot_asks(event))
         self._is_asked_in_line = bool(self._line)
+        if ended is not None:
+            self.take(at, lambda talk: talk.turn_ends(max(ended, at)))
+
+    def robot_stops(self, action: Action, at: Seconds) -> None:
+        if not self.is_under_way:
+            return
+        match action:
+            case "speak":
+                self.take(at, lambda talk: talk.robot_falls_silent(at))
+            case "nod" | "shake" | "point":
+                self.take(at, lambda talk: talk.robot_gesture_ends(action, at))
+
+    def withdraw(self, event: OngoingEvent, at: Seconds, *, is_orphan: bool) -> None:
+        """Withdraw a pair of the robot.
+
+        What the robot has said until the end of its turn is answered all the same: a pair without anybody who asked
+        for it stays.
+        """
+        self.take(at, lambda talk: talk.withdraw(event, at, is_orphan=is_orphan))
+
+    def abort(self, at: Seconds, *, turn: str) -> None:
+        self.take(at, lambda talk: talk.abort(at, turn=turn))
+
+    def block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
+        self.take(at, lambda talk: talk.block_ended(block, at, aborted=aborted))
 
     def _take_in_order(self, at: Seconds, step: Step) -> None:
         """Take what ends a question of the robot, after what somebody else may have answered before."""
@@ -257,18 +309,26 @@ class Talk:
         """Decide to whom a speech is by what is likely."""
         if speech.until is None:
             speech.faces.turns(speech.faces.face, at)
-        self._address(speech, likely(speech, self._scene.spoken), at)
+        is_noise = self._scene.tells_addressees and not says_words(speech.words)
+        waits = self._conversation.pair.may_be_answered_with("speak")
+        awaited_by = frozenset((self._scene.robot,)) if waits else NOBODY
+        to = likely(speech, self._scene.spoken, awaited_by=awaited_by, is_noise=is_noise)
+        self._address(speech, to, at)
+
+    def may_go_on(self, now: Seconds) -> bool:
+        """True if it is decided by `now` to whom the first speech in line is, or if what is decided may be told."""
+        if not self._line:
+            return False
+        decided_at = self._decided_at
+        return not self._waits_for_others(self._line[0][0]) if decided_at is None else decided_at <= now
 
     def go_on(self, now: Seconds) -> None:
         """Tell all in line up to the next speech of which it is not known to whom it is."""
-        while self._line:
+        while self.may_go_on(now):
             at, item = self._line[0]
             if isinstance(item, OwnSpeech) and item.to is None:
-                if self._decided_at is None or self._decided_at > now:
-                    break
                 self._likely(item, now)
-            if self._waits_for_others(at):
-                break
+                continue
             self._line.popleft()
             self._catch_up(at)
             if not isinstance(item, OwnSpeech):

@@ -9,21 +9,22 @@ that id as they come in, and what is told gets the person's name as it goes out.
 `face_3` turns out to be `ann` goes on as it is, and is told as ann's from then on.
 
 Two ids are one person if perception says so (`ActorFound.same_as`), or if the second is first seen where the first
-was lost. That is a guess, and ends as soon as both are seen in turn.
+was lost. That is a guess. It ends as soon as both are seen, or perception says that the second is somebody else:
+what is told from then on of the second is told by its own id.
 """
 
 import math
-from collections.abc import Callable
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 from msgspec import Struct
-from msgspec.structs import replace
 
 from engage_hri.schemas.perception import ActorFound, ActorLost, HeadPose
+from engage_hri.schemas.recognition import SamePerson
 from engage_hri.schemas.units import Seconds, Vector
-from engage_hri.schemas.world import Entity, World
+from engage_hri.schemas.world import World
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.reports.action_reports import FACE_GRACE
+from engage_hri.services.reports.same_people import AnyStruct, renamed
 
 SAME_PLACE = 0.3
 """Metres between the place where a person was lost and that where another id is found. Ours."""
@@ -31,9 +32,6 @@ PLACED_WITHIN: Seconds = 0.5
 """Time from the first sign of a new id until its place counts no more: it was found somewhere. Ours."""
 IDS_KEPT = 256
 """Number of ids that are remembered as another of somebody, and of those of whom it is known where they were."""
-_IDS = frozenset({"actor", "initiator", "responder", "answered_by", "target", "targets", "to", "owner"})
-"""Fields with ids of people, or of things, which are never joined."""
-AnyStruct = TypeVar("AnyStruct", bound=Struct)
 
 
 class Join(NamedTuple):
@@ -44,6 +42,13 @@ class Join(NamedTuple):
 
     newer: str
     former: str
+    name: str
+
+
+class Parting(NamedTuple):
+    """An id that was taken for somebody else's is of a person of its own. name: by which it was told of."""
+
+    id: str
     name: str
 
 
@@ -75,8 +80,8 @@ class Identities:
         """The id by which recognition knows a person, by each other id of this person. The longest known first."""
         self._names: dict[str, str] = {}
         """The id by which a person is told of, where recognition knows them by another."""
-        self._guessed: set[str] = set()
-        """Ids that were joined by their place."""
+        self._guessed: dict[str, frozenset[str]] = {}
+        """Ids that were joined by their place, each with those that the person had before."""
         self._apart: Latest[str, None] = Latest(IDS_KEPT)
         """Ids that were joined so by mistake."""
         self._seen: Latest[str, _Sighting] = Latest(IDS_KEPT)
@@ -107,32 +112,75 @@ class Identities:
         for id in oldest[: max(0, len(self._inside) - IDS_KEPT)]:
             self._drop(id)
 
+    def others(self) -> tuple[SamePerson, ...]:
+        """All ids by which people are not told of."""
+        ids = {**self._inside, **{id: id for id in self._names if id not in self._inside}}
+        people = [(id, self.name(inside)) for id, inside in ids.items()]
+        return tuple(
+            SamePerson(actor=id, name=name, is_guess=id in self._guessed) for id, name in people if id != name
+        )
+
+    def resume(self, people: tuple[SamePerson, ...]) -> None:
+        """Go on with the ids that a former life has told of."""
+        for actor, name, is_guess in ((each.actor, each.name, each.is_guess) for each in people):
+            if is_guess:
+                self._guessed[actor] = self._all(name)
+            self.join(name, actor, name)
+
+    def _all(self, inside: str) -> frozenset[str]:
+        """All ids of a person."""
+        return frozenset({inside, self.name(inside), *(id for id, at in self._inside.items() if at == inside)})
+
     def is_other(self, id: str) -> bool:
         """True of an id by which recognition knew somebody whom it knows by another now."""
         return id in self._inside
 
-    def forget(self, id: str) -> None:
-        """Forget all ids of a person. id: by which recognition knew them."""
+    def forget(self, id: str) -> bool:
+        """Forget all ids of a person; True if there were several. id: by which recognition knew them."""
         if id in self._inside:
-            return  # the person is known by another
-        for each in [each for each, inside in self._inside.items() if inside == id]:
+            return False  # the person is known by another
+        ids = self._all(id)
+        for each in ids:
             self._drop(each)
-        self._names.pop(id, None)
-        self._guessed.discard(id)
+        return len(ids) > 1
 
     def _drop(self, id: str) -> None:
-        del self._inside[id]
+        self._inside.pop(id, None)
         self._names.pop(id, None)
-        self._guessed.discard(id)
+        self._guessed.pop(id, None)
+
+    def _part(self, id: str) -> Parting:
+        """Take an id that was joined by its place for one of a person of its own; ids that came later are of it, too.
+
+        Recognition knows the person by the same id as before: who that is tells what is open with them.
+        """
+        inside, everybody = self.inside(id), self._all(self.inside(id))
+        name, former = self.name(inside), self._guessed.pop(id) & everybody
+        own = everybody - former
+        self._apart[id] = None
+        if inside in former:
+            leaving, head, told = own, id, id
+        else:
+            leaving, head, told = former, name, name
+            self._names.pop(inside, None)
+            if inside != id:
+                self._names[inside] = id
+        for each in leaving:
+            self._inside.pop(each, None)
+            self._names.pop(each, None)
+        self._inside |= {each: head for each in leaving if each != head}
+        return Parting(id, told)
 
     # -- what perception tells ----------------------------------------------------------------------------------
 
-    def take(self, message: object, at: Seconds) -> list[Join]:
-        """Take a message as it came, of what was seen at `at`. Returns which ids are one person by it."""
+    def take(self, message: object, at: Seconds) -> list[Join | Parting]:
+        """Take a message as it came, of what was seen at `at`. Returns who turns out to be one person, or two."""
         match message:
             case ActorFound(actor=actor, same_as=former):
-                self._see(actor, at).found = True
-                return self._told(actor, former) if former else []
+                told = self._told(actor, former) if former else []
+                parted = self._see(actor, at)
+                self._seen[actor].found = True
+                return [*told, *parted]
             case ActorLost(actor=actor) if actor in self._seen:
                 self._seen[actor].lost, self._seen[actor].found = at, False
             case HeadPose(actor=actor, position=place):
@@ -143,78 +191,68 @@ class Identities:
                     if seen.in_world and id not in there:
                         seen.in_world = False
                         seen.lost = at if seen.lost is None and not seen.found else seen.lost
-                joins = [join for person in people for join in self._place(person.id, person.position, at)]
+                changes = [change for person in people for change in self._place(person.id, person.position, at)]
                 for id in there & self._seen.keys():
                     self._seen[id].in_world = True
-                return joins
+                return changes
         return []
 
-    def _told(self, actor: str, former: str) -> list[Join]:
+    def _told(self, actor: str, former: str) -> list[Join | Parting]:
+        """Take the word of perception that an id is somebody's who has another."""
+        changes: list[Join | Parting] = []
         newer, known = self.inside(actor), self.inside(former)
-        self._guessed -= {actor, former}
+        for id in {actor, former} & self._guessed.keys():
+            if newer == known:
+                del self._guessed[id]  # it was right
+            elif id == actor:
+                changes.append(self._part(id))
+        newer, known = self.inside(actor), self.inside(former)
         name = former if newer == known else self.name(known)
-        return [] if newer == known and self.name(known) == name else [Join(newer, known, name)]
+        if newer != known or self.name(known) != name:
+            changes.append(Join(newer, known, name))
+        return changes
 
-    def _see(self, id: str, at: Seconds) -> _Sighting:
-        """Take a sign of an id."""
+    def _see(self, id: str, at: Seconds) -> list[Join | Parting]:
+        """Take a sign of an id. Returns who is somebody else after all: both are there."""
         seen = self._seen.get(id)
         if seen is None:
-            self._seen[id] = seen = _Sighting(at, at)
-            return seen
-        is_guess = id in self._guessed and id in self._inside
-        former = self._seen.get(self.inside(id)) if is_guess else None
-        if former is not None and former.lost is None and seen.lost is None and former.at >= seen.at:
-            self._apart[id] = None  # both are there
-            self._drop(id)
+            self._seen[id] = _Sighting(at, at)
+            return []
+        before = seen.at
         self._seen[id] = seen  # the latest
         seen.at, seen.lost = max(at, seen.at), None
-        return seen
+        return [
+            self._part(guessed)
+            for guessed, former in tuple(self._guessed.items())
+            if (id == guessed and any(self._is_with(each, before) for each in former))
+            or (id in former and self._is_with(guessed, before))
+        ]
 
-    def _place(self, id: str, place: Vector, at: Seconds) -> list[Join]:
+    def _is_with(self, id: str, before: Seconds) -> bool:
+        """True if this one has been seen since the last sign of another, which came `before`, and has not gone."""
+        seen = self._seen.get(id)
+        return seen is not None and seen.lost is None and (seen.found or seen.in_world or seen.at >= before)
+
+    def _place(self, id: str, place: Vector, at: Seconds) -> list[Join | Parting]:
         """Take where an id is. Returns whose it is, too, if it is new."""
         if id == self._robot:
             return []
-        seen = self._see(id, at)
+        parted, seen = self._see(id, at), self._seen[id]
         is_new, seen.place = seen.place is None and at <= seen.since + PLACED_WITHIN, place
         if not is_new or id in self._inside or id in self._names or id in self._apart:
-            return []
+            return parted
         lost = [
             other for other, one in self._seen.items() if other != id and self._is_lost_at(one, place, seen.since)
         ]
         known = {self.inside(other) for other in lost} - {id}
         if len(known) != 1:
-            return []
+            return parted
         former = known.pop()
-        self._guessed.add(id)
-        return [Join(id, former, self.name(former))]
+        self._guessed[id] = self._all(former)
+        return [*parted, Join(id, former, self.name(former))]
 
     def _is_lost_at(self, one: _Sighting, place: Vector, at: Seconds) -> bool:
         """True if this one was lost by `at`, not long before, and near this place."""
         lost = one.lost_at(at)
         is_recent = lost is not None and lost <= at < lost + FACE_GRACE
         return is_recent and one.place is not None and math.dist(one.place, place) <= SAME_PLACE
-
-
-def renamed(message: AnyStruct, name: Callable[[str], str]) -> AnyStruct:
-    """Return the message with other ids of people. name: the new one of each."""
-    changes: dict[str, object] = {}
-    is_person = isinstance(message, Entity) and message.kind == "person"
-    for field in message.__struct_fields__:
-        held = getattr(message, field)
-        new = _renamed(held, name, is_id=field in _IDS or (is_person and field == "id"))
-        if new is not held:
-            changes[field] = new
-    return replace(message, **changes) if changes else message
-
-
-def _renamed(held: object, name: Callable[[str], str], *, is_id: bool) -> object:
-    match held:
-        case str() if is_id:
-            return name(held)
-        case Struct():
-            return renamed(held, name)
-        case tuple() | frozenset() if held and not hasattr(held, "_fields"):
-            new = [_renamed(each, name, is_id=is_id) for each in held]
-            is_same = all(one is other for one, other in zip(new, held, strict=True))
-            return held if is_same else type(held)(new)
-    return held

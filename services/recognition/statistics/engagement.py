@@ -2,10 +2,10 @@
 
 Contact is what goes on: the share of the last seconds in which something was between the two (`contact`). Pace is
 what begins: the usual time between connection events over the recent one, or over the silence that goes on if that is
-longer; times the share of recent events that did not fail. Silence is only that in which there is no contact either:
-who tells the robot a story begins nothing for a minute. While the person is busy with a task nothing is concluded
-from silence: that explains the 70 s gap of the canapé study. The estimate is the mean of the two, or the one that is
-known.
+longer; times the share of recent events that did not fail. What the robot has not answered is no failure of the
+person's (decision 0198). Silence is only that in which there is no contact either: who tells the robot a story begins
+nothing for a minute. While the person is busy with a task nothing is concluded from silence: that explains the 70 s
+gap of the canapé study. The estimate is the mean of the two, or the one that is known.
 
 The levels are those of ROS4HRI: a person becomes engaged and leaves again by way of `engaging` and `disengaging`.
 """
@@ -64,14 +64,15 @@ def next_level(level: EngagementLevel, value: Probability, config: RecognitionCo
 
 
 class Engagement:
-    """Estimate for one actor (or all), from its tally."""
+    """Estimate for one actor (or all), from its tally. robot: its actor id."""
 
-    def __init__(self, config: RecognitionConfig, tally: EventTally) -> None:
+    def __init__(self, config: RecognitionConfig, tally: EventTally, robot: str) -> None:
         self.estimate = UNKNOWN
         self.busy = False
         self.contact = ContactShare()
         self._config = config
         self._tally = tally
+        self._robot = robot
         self._busy_until: Seconds = float("-inf")
         self._apart_since: Seconds = float("-inf")
         """Time at which the last contact ended."""
@@ -122,7 +123,7 @@ class Engagement:
     def _pace(self, now: Seconds) -> tuple[Probability, tuple[str, str]]:
         """Pace times quality, and why."""
         usual, silent = self._usual, self._silence(now)
-        window = self._tally.pace(now)
+        window = self._tally.pace(now, self._robot)
         recent = window.mean if now >= self._recent_from else None
         failed, judged = window.failed, window.judged
         speed, good = pace(usual, recent, silent), quality(failed, judged)
@@ -174,7 +175,7 @@ class Engagement:
         """Time at which silence alone has passed the next threshold, where pace is all that is known."""
         level = self.estimate.level
         threshold = (self._config.engaged_from if level == "engaged" else self._config.disengaged_below) - HYSTERESIS
-        window = self._tally.pace(now)
+        window = self._tally.pace(now, self._robot)
         good = quality(window.failed, window.judged)
         if level == "disengaged" or threshold <= 0.0 or good <= threshold:
             return []

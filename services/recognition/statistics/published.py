@@ -19,7 +19,8 @@ from engage_hri.services.recognition.events.machine import PersonForgotten
 from engage_hri.services.recognition.statistics.engagement import Engagement, EngagementEstimate
 from engage_hri.services.recognition.statistics.tally import EventTally
 
-EVERYBODY = ""
+TOGETHER = ""
+"""Stands for all people, in statistics."""
 TOLD_EVERY: Seconds = 1.0
 """Least time between two messages of one actor, unless the level changes or somebody gets busy. Decision 0182."""
 
@@ -27,9 +28,9 @@ TOLD_EVERY: Seconds = 1.0
 class _ActorStatistics:
     """Counts and estimate of one person, or of all."""
 
-    def __init__(self, config: RecognitionConfig, clock: str) -> None:
+    def __init__(self, config: RecognitionConfig, clock: str, robot: str) -> None:
         self.tally = EventTally(config.window, clock)
-        self.engagement = Engagement(config, self.tally)
+        self.engagement = Engagement(config, self.tally, robot)
         self.told_at: Seconds = -inf
         self.is_new = False
         """True if something has changed since it was told."""
@@ -60,7 +61,7 @@ class PublishedStatistics:
         self._robot = robot
         self._clock = clock
         self._config = config
-        self._actors = defaultdict[str, _ActorStatistics](partial(_ActorStatistics, config, clock))
+        self._actors = defaultdict[str, _ActorStatistics](partial(_ActorStatistics, config, clock, robot))
         self._changed: set[str] = set()
         """Actors of whom something has come in since `told` was last called."""
         self._agenda: Deadlines[str] = Deadlines(str)
@@ -92,7 +93,7 @@ class PublishedStatistics:
                 self._agenda.clear(change.actor)
                 self._changed.discard(change.actor)
                 continue
-            for name in (change.person(self._robot), EVERYBODY):
+            for name in (change.person(self._robot), TOGETHER):
                 one = self._actors[name]
                 one.tally.feed(change)
                 one.is_new = True
@@ -103,7 +104,7 @@ class PublishedStatistics:
     def resume(self, former: Statistics, now: Seconds) -> None:
         """Go on from the numbers of a former life. Its contacts and recent events are not known."""
         name = former.actor
-        one = self._actors[name] = _ActorStatistics(self._config, self._clock)
+        one = self._actors[name] = _ActorStatistics(self._config, self._clock, self._robot)
         one.tally.resume(former.session)
         one.engagement.estimate = EngagementEstimate(former.engagement, former.level, former.reasons)
         one.is_new = True
@@ -124,19 +125,19 @@ class PublishedStatistics:
 
     def resume_event(self, event: ConnectionEvent) -> None:
         """Take an event that goes on from a former life, which has counted its start."""
-        for name in (event.person(self._robot), EVERYBODY):
+        for name in (event.person(self._robot), TOGETHER):
             self._actors[name].tally.resume_event(event)
 
     def _get_busy(self, busy: frozenset[str], now: Seconds) -> None:
         """Freeze the estimate of who has got busy, and of all, as it is now; or let it go."""
-        changed, self._busy = {EVERYBODY, *(busy ^ self._busy)}, busy
+        changed, self._busy = {TOGETHER, *(busy ^ self._busy)}, busy
         for actor in changed:
             self._actors[actor].engagement.update(now, busy=self._is_busy(actor))
             self._actors[actor].is_urgent = True
         self._changed |= changed
 
     def _is_busy(self, actor: str) -> bool:
-        return bool(self._busy) if actor == EVERYBODY else actor in self._busy
+        return bool(self._busy) if actor == TOGETHER else actor in self._busy
 
     def told(self, now: Seconds) -> list[Statistics]:
         """Make the statistics that are to be told by now."""
@@ -155,7 +156,7 @@ class PublishedStatistics:
 
     def overall(self, now: Seconds) -> Statistics:
         """Statistics of all together, as they are."""
-        return self._statistics(EVERYBODY, now)
+        return self._statistics(TOGETHER, now)
 
     def _statistics(self, actor: str, now: Seconds) -> Statistics:
         one = self._actors[actor]

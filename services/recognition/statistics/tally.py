@@ -11,17 +11,16 @@ that is told of the recent window: of each event in it only the last change is k
 from bisect import bisect_left, insort
 from collections.abc import Iterable, Sequence
 from operator import sub
-from typing import NamedTuple, get_args
+from typing import NamedTuple
 
 from msgspec import Struct, field
 
-from engage_hri.schemas.behaviors import EventKind
+from engage_hri.schemas.behaviors import EVENT_KINDS, EventKind
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent, KindStatistics, WindowStatistics
 from engage_hri.schemas.units import Seconds, Stamp
 
 SETTLED: Seconds = 120.0
 """Longest time until a start becomes known: a later one is counted, but splits no gap."""
-KINDS: tuple[EventKind, ...] = get_args(EventKind)
 
 
 class Spread(Struct):
@@ -178,7 +177,7 @@ class _Window:
     """Counts and starts of the session, or of the recent window."""
 
     def __init__(self) -> None:
-        self.counts = {kind: Count() for kind in KINDS}
+        self.counts = {kind: Count() for kind in EVENT_KINDS}
         self.starts = Starts()
         self.own_starts = Starts()
         """Starts without the glances that the maintenance policy caused."""
@@ -315,7 +314,7 @@ class EventTally:
 
     def next_change(self, now: Seconds) -> Seconds | None:
         """Time after `now` at which the next event leaves the recent window."""
-        first = self.pace(now).first
+        first = min((event.started.seconds for event in self._window(now)), default=None)
         return None if first is None else first + self._length
 
     def session(self) -> WindowStatistics:
@@ -328,8 +327,11 @@ class EventTally:
             window.counts[event.kind].decide(event)
         return window.statistics(self._clock)
 
-    def pace(self, now: Seconds) -> RecentPace:
-        """Pace and failures of the recent window. Preempted, withdrawn and superseded events are not judged."""
+    def pace(self, now: Seconds, robot: str) -> RecentPace:
+        """Pace and failures of the recent window. Preempted, withdrawn and superseded events are not judged.
+
+        Nor are those that the robot has not answered: they say nothing of the person. robot: its actor id.
+        """
         events = self._window(now)
         starts = [event.started.seconds for event in events]
         if not starts:
@@ -337,6 +339,8 @@ class EventTally:
         judged = [
             event.state
             for event in events
-            if not event.optional and event.state in ("succeeded", "failed") and not event.is_answered_by_another
+            if not event.optional
+            and (event.state == "succeeded" or (event.state == "failed" and event.initiator == robot))
+            and not event.is_answered_by_another
         ]
         return RecentPace(min(starts), max(starts), len(starts), judged.count("failed"), len(judged))

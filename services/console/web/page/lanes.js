@@ -157,19 +157,19 @@ const GOOD = new Set(["succeeded", "completed"]);
 
 export function eventLanes(panel) {
   panel.querySelector(".legend").replaceChildren(
-    ...KINDS.map(([, name, shade]) => element("span", {}, element("i", { style: `background: var(${shade})` }), name)),
+    ...KINDS.map(([, name, , shade]) => element("span", {}, element("i", { style: `background: var(${shade})` }), name)),
     element("span", {}, element("i", { class: "hollow" }), "waits for the other"),
     element("span", {}, "✕ failed"), element("span", {}, "– dropped"), element("span", {}, "(…) optional"),
   );
   return lanes(panel, tellEvents, (view) => {
     const { context, state, x, width, height, now, first } = view;
     const rows = [];
-    for (const [kind, name] of KINDS) {
-      if (kind !== "backchannel") rows.push({ kind, mine: true, name: `${state.robot}: ${name}` });
+    for (const [kind, name, isAnswered] of KINDS) {
+      if (isAnswered) rows.push({ kind, mine: true, name: `${state.robot}: ${name}` });
       rows.push({ kind, mine: false, name: `people: ${name}` });
     }
     const size = (height - AXIS) / rows.length;
-    const shades = new Map(KINDS.map(([kind, , shade]) => [kind, shade]));
+    const shades = new Map(KINDS.map(([kind, , , shade]) => [kind, shade]));
     context.font = `${Math.min(LABEL, size * 0.62)}px system-ui, sans-serif`;
     rows.forEach((each, index) => row(context, view, index * size, size, each.name, index % 2));
     context.save();

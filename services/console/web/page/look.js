@@ -1,11 +1,8 @@
 // Colours and sizes that several pictures share. Colours of the theme are read from the style sheet.
-// Kinds of connection events: name, colour, and the mark that tells them apart where there is only a dot.
-export const KINDS = [
-  ["directed_gaze", "directed gaze", "--gaze", "●"],
-  ["mutual_facial_gaze", "mutual gaze", "--mutual", "■"],
-  ["adjacency_pair", "adjacency pair", "--pair", "▲"],
-  ["backchannel", "backchannel", "--back", "◆"],
-];
+// Kinds of connection events, as the server knows them: kind, name, whether it is answered, colour, and the mark that
+// tells them apart where there is only a dot.
+const SHADES = [["--gaze", "●"], ["--mutual", "■"], ["--pair", "▲"], ["--back", "◆"], ["--point", "★"], ["--quiet", "✚"]];
+export const KINDS = JSON.parse(document.body.dataset.kinds).map((each, index) => [...each, ...SHADES[index % SHADES.length]]);
 
 const PIECES = {
   blue: "#3f6fd1", green: "#3f9d55", purple: "#8a54b8", pink: "#e389b5", white: "#f4f2ea", yellow: "#e9c53c",

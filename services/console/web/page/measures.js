@@ -5,7 +5,7 @@ export function measures(panel) {
   const canvas = panel.querySelector("canvas");
   const reasons = panel.querySelector(".reasons");
   panel.querySelector(".legend").replaceChildren(
-    ...KINDS.map(([, name, shade, mark]) => element("span", {}, element("b", { style: `color: var(${shade})` }, mark), ` ${name}`)));
+    ...KINDS.map(([, name, , shade, mark]) => element("span", {}, element("b", { style: `color: var(${shade})` }, mark), ` ${name}`)));
   let stale = true;
   new ResizeObserver(() => (stale = true)).observe(canvas);
   let theme = null;
@@ -49,7 +49,7 @@ function draw(canvas, state) {
   });
   const most = ceiling(delays, 2);
   const y = frame(context, "delay of each event (s)", most, 2 * part, part, left, width);
-  const looks = new Map(KINDS.map(([kind, , shade, mark]) => [kind, [shade, mark]]));
+  const looks = new Map(KINDS.map(([kind, , , shade, mark]) => [kind, [shade, mark]]));
   context.textAlign = "center";
   for (const [at, delay, kind] of delays) {
     const [shade, mark] = looks.get(kind);

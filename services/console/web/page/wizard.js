@@ -16,13 +16,19 @@ export function wizard(panel, order) {
 
   const text = input("tell", "Say", { maxlength: "1000" });
   const target = choice("target", "about");
-  const whom = choice("whom", "to");
+  const whom = element("span", { class: "field", role: "group", "aria-label": "To" });
+  const addressee = () => [...whom.querySelectorAll("input:checked")].map((each) => each.value);
+  const who = choice("who", "may interrupt", [["", "who is addressed"], ["*", "anybody"], ["false", "nobody"]]);
+  const after = choice("after", "", [[0, "at once"], [1, "after 1 s"], [2, "after 2 s"], [4, "after 4 s"]]);
+  after.field.setAttribute("aria-label", "When they interrupt");
+  who.parts[0].append(after.field);
   const tell = (asks) => {
-    const said = { do: "tell", text: text.field.value.trim(), target: target.field.value, addressee: whom.field.value, asks };
-    send(said);
+    const interruptible = who.field.value === "false" ? false : who.field.value;
+    send({ do: "tell", text: text.field.value.trim(), target: target.field.value, addressee: addressee(), asks,
+      interruptible, interruptible_after: Number(after.field.value) });
     text.field.value = "";
   };
-  const form = element("form", { class: "row" }, ...text.parts, ...target.parts, ...whom.parts,
+  const form = element("form", { class: "row" }, ...text.parts, ...target.parts, whom, ...who.parts,
     element("button", { type: "submit", class: "main" }, "Say it"), button("Ask it", () => tell(true)));
   form.addEventListener("submit", (event) => {
     event.preventDefault();
@@ -34,8 +40,8 @@ export function wizard(panel, order) {
     const at = gaze.field.value;
     send({ do: "inhibit", on, mode: at ? "target" : "hold", target: at });
   }, { "aria-pressed": "false" });
-  const signs = element("div", { class: "row" }, button("Nod", () => send({ do: "backchannel", how: "nod", addressee: whom.field.value })),
-    button("Uh-huh", () => send({ do: "backchannel", how: "uh-huh", addressee: whom.field.value })), ...gaze.parts, inhibit);
+  const signs = element("div", { class: "row" }, button("Nod", () => send({ do: "backchannel", how: "nod", addressee: addressee() })),
+    button("Uh-huh", () => send({ do: "backchannel", how: "uh-huh", addressee: addressee() })), ...gaze.parts, inhibit);
   const steer = element("div", { class: "row", role: "group", "aria-label": "What the robot performs" },
     button("Stop", () => send({ do: "steer", to: "stop" }), { class: "stop" }),
     button("Hold", () => send({ do: "steer", to: "hold" })), button("Go on", () => send({ do: "steer", to: "continue" })));
@@ -89,7 +95,7 @@ export function wizard(panel, order) {
         inhibit.setAttribute("aria-pressed", String(Boolean(inhibits)));
         inhibit.textContent = inhibits ? "Let go" : "Keep";
         script.replaceChildren(...titles.map((title, number) => element("li", {},
-          button(`${number < 9 ? `${number + 1}  ` : ""}${title}`, () => send({ do: "prepared", number, addressee: whom.field.value })))));
+          button(`${number < 9 ? `${number + 1}  ` : ""}${title}`, () => send({ do: "prepared", number, addressee: addressee() })))));
         switches(kinds);
       }
       if (changed.has("switched")) {
@@ -105,7 +111,7 @@ export function wizard(panel, order) {
       if (changed.has("scene")) {
         const { things, people } = state.scene;
         options(target.field, "(nothing)", things.filter((each) => each.kind === "object").map((each) => each.id));
-        options(whom.field, "(whoever is there)", people.filter((each) => each.at).map((each) => each.id));
+        boxes(whom, people.filter((each) => each.at).map((each) => each.id));
         options(gaze.field, "where it is", [...people.filter((each) => each.at), ...things.filter((each) => each.kind === "object")].map((each) => each.id));
       }
     },
@@ -130,14 +136,28 @@ function input(id, name, attributes) {
   return { field, parts: [labelled(name, field, "field wide")] };
 }
 
-function choice(id, name) {
-  const field = element("select", { id: `wizard-${id}` });
+function choice(id, name, values = []) {
+  const field = element("select", { id: `wizard-${id}` }, ...values.map(([value, text]) => element("option", { value }, text)));
   return { field, parts: [labelled(name, field, "field")] };
 }
 
 // A field and its name, which stay together where a line is broken.
 function labelled(name, field, kind) {
   return element("span", { class: kind }, element("label", { for: field.id }, name), field);
+}
+
+// A box for each person: who is ticked is spoken to. With none ticked it is whoever is there.
+function boxes(group, ids) {
+  const key = ids.join();
+  if (group.dataset.ids === key) return;
+  group.dataset.ids = key;
+  const chosen = [...group.querySelectorAll("input:checked")].map((each) => each.value);
+  const person = (id) => {
+    const box = element("input", { type: "checkbox", id: `wizard-to-${id}`, value: id, checked: chosen.includes(id) });
+    return element("span", { class: "field" }, box, element("label", { for: box.id }, id));
+  };
+  group.hidden = ids.length < 2;
+  group.replaceChildren(element("span", { class: "label" }, "to"), ...ids.map(person));
 }
 
 function options(field, none, ids) {
