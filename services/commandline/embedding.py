@@ -97,5 +97,9 @@ async def play_tangram(
     async with MemoryHub(config.robot, decodes=False) if hub is None else nullcontext(hub) as hub:
         bound = services(config, *roster.PLAY)
         kept = recording(hub.join("record"), record, (keys.EVERYTHING,), {}) if record else nullcontext()
-        async with kept, following(hub.join("console"), sinks), running(hub, bound) as over:
-            await over.wait()
+        bus = hub.join("console")
+        try:
+            async with kept, following(bus, sinks), running(hub, bound) as over:
+                await over.wait()
+        finally:
+            await bus.leave()
