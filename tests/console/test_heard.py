@@ -52,7 +52,7 @@ def arrive(hub: MemoryHub, name: str = "camera") -> tuple[Bus, PerceivedPerson]:
 
 
 def people(picture: Picture) -> list[tuple[str, bool, tuple[str, ...] | None]]:
-    scene = picture._made("scene")
+    scene = picture.made("scene")
     return [(each.id, each.present, each.looks) for each in scene.people]
 
 
