@@ -178,7 +178,15 @@ def _manages(role: str, presence: str, *more: str, why: str = "") -> Iterator[Ro
 
 def _looks(role: str, *more: str) -> Iterator[Row]:
     """Rows for what `engage console` shows besides what people watch."""
-    shown = (keys.NET, keys.ROBOT_STATE, keys.ROBOT_MOTION, keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING, *more)
+    shown = (
+        keys.NET,
+        keys.ROBOT_STATE,
+        keys.ROBOT_MOTION,
+        keys.ROBOT_ONGOING,
+        keys.ANY_PERCEIVED_ONGOING,
+        keys.ROBOT_SOUND,
+        *more,
+    )
     yield from (Row(role, "subscribes", key, "shown by `engage console`") for key in shown)
 
 
@@ -221,6 +229,10 @@ TABLE: tuple[Row, ...] = (
         for key in (keys.ANY_ROBOT_ALIVE, keys.WORLD, keys.FEEDBACK, keys.SYNC_POINT, keys.ROBOT_ACTION,
                     keys.ANY_CONNECTION_EVENT, keys.ROBOT_MOTION, keys.ROBOT_SEEN, keys.BODY_FAULTS)
     ),
+    Row("control", "publishes", keys.ROBOT_SOUND, "told while somebody plays it, or tells it from people's voices"),
+    Row("perception", "publishes", keys.ANY_SOUND, "of microphones"),
+    Row("perception", "subscribes", keys.ANY_SOUND, "for those who hear what people say"),
+    Row("perception", "subscribes", keys.ROBOT_SOUND, "told from the voices of people"),
     Row("perception", "serves", keys.status(OWN)),
     Row("perception", "asks", ANY_STATUS, "asked by a service that waits for another, to say why"),
     *_manages("manager", keys.ANY_ROBOT_ALIVE),
@@ -244,14 +256,19 @@ TABLE: tuple[Row, ...] = (
     *_looks("wizard"),
     *(
         Row("wizard", "publishes", key, "says what perception does not see; visitors of `engage console` are people")
-        for key in (keys.PERCEIVED_ACTION, keys.UTTERANCE, _OWN_ONGOING, keys.WORLD)
+        for key in (keys.PERCEIVED_ACTION, keys.UTTERANCE, _OWN_ONGOING, keys.WORLD, keys.ANY_SOUND)
     ),
 )  # fmt: skip
 """The table. `tests/access` checks it against what really flows."""
 
 ROLES = tuple(dict.fromkeys(row.role for row in TABLE))
 """Roles that a holder may have, without `ROUTER`."""
-PARTICIPANTS = {**{name: name for name in keys.SERVICES}, "simulation": "perception", "collaboration": "manager"}
+PARTICIPANTS = {
+    **{name: name for name in keys.SERVICES},
+    "simulation": "perception",
+    "hearing": "perception",
+    "collaboration": "manager",
+}
 """Roles of the services that have another name."""
 
 

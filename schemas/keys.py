@@ -71,6 +71,12 @@ ROBOT_MOTION = f"{PREFIX}/stream/control/robot_state"
 NET = f"{PREFIX}/stream/realizer/net"
 ANY_HEAD_POSE = f"{PREFIX}/stream/perception/head/*"
 ANY_VOICE_ACTIVITY = f"{PREFIX}/stream/perception/voice/*"
+SOUND = "@sound"
+"""Chunk in the keys of sound: no wildcard includes it, so that nobody hears or records a voice by accident."""
+ROBOT_SOUND = f"{PREFIX}/stream/control/{SOUND}"
+"""`SoundFrame`: what the robot's voice says, a moment before it is heard, while somebody listens."""
+ANY_SOUND = f"{PREFIX}/stream/perception/{SOUND}/*"
+"""`SoundFrame` of all microphones."""
 
 ESTIMATE = f"{PREFIX}/rpc/control/estimate"
 DESCRIBE = f"{PREFIX}/rpc/control/describe"
@@ -260,6 +266,11 @@ def head_pose(actor: str) -> str:
 
 def voice_activity(actor: str) -> str:
     return f"{PREFIX}/stream/perception/voice/{actor}"
+
+
+def sound(source: str) -> str:
+    """Key of the sound of a microphone. source: id of the person whose it is, or a name of its own."""
+    return f"{PREFIX}/stream/perception/{SOUND}/{source}"
 
 
 def alive(participant: str, part: Part = "robot") -> str:

@@ -22,6 +22,7 @@ from engage_hri.schemas import (
     perception,
     recognition,
     requests,
+    sound,
     world,
 )
 from engage_hri.schemas.access import LARGEST, check_size
@@ -48,6 +49,7 @@ Message = (
     | body_faults.SwitchFaults | body_faults.FaultsSwitched | body_faults.BodyFaults
     | perception.ActionBegan | perception.ActionEnded | perception.ActorFound | perception.ActorLost
     | perception.OngoingActions | perception.Utterance | perception.HeadPose | perception.VoiceActivity
+    | sound.SoundFrame
     | world.World
     | recognition.RequestEvent | recognition.EventOutcome | recognition.SignalTurn | recognition.TurnOutcome
     | recognition.ConnectionEvent | recognition.OpenEvents | recognition.Statistics
@@ -143,7 +145,8 @@ def _decoder_of(encoding: str) -> "msgspec.msgpack.Decoder[Any] | msgspec.json.D
 
 
 LineMessage = (
-    recognition.ConnectionEvent | recognition.Statistics | perception.Utterance | Fault
+    recognition.ConnectionEvent | recognition.Interjection | recognition.Floor | recognition.Statistics
+    | perception.Utterance | Fault
     | fragments.HeadOwner | fragments.StudyCondition | body_faults.BodyFaults
     | Feedback | blocks.Held | blocks.BodyHeld | blocks.NetPlanned | blocks.NetMarked | blocks.NetWaiting
 )  # fmt: skip

@@ -26,12 +26,16 @@ SHELLS = {
     "services/control/voice/sounding.py",  # a body that speaks on the loop's clock
     "services/control/contract/bell.py",  # waits for a moment or a change of authority
     "services/console/web/sessions.py",  # ends sessions whose page does not come back
+    "services/perception/hearing/child.py",  # a process with pipes
+    "services/perception/hearing/listening.py",  # runs the process of a recognizer
+    "services/perception/hearing/microphone.py",  # plays a file, or runs the program that records
     "services/recording/replay.py",  # says what was said
     "services/simulation/still.py",  # a world, published once, and what its people do
     "services/tangram/collaboration/host.py",  # asks people who talk
     "services/console/follow.py",  # subscribes
     "services/console/terminal/live.py",  # draws
     "services/console/web/server.py",  # serves the page
+    "services/console/web/sounds.py",  # sound to the page, and from it
     "services/console/web/visitor.py",  # carries out orders
 }
 """Files beside `service.py` that are not pure. Each is a decision: keep the list short."""

@@ -53,13 +53,16 @@ KNOW_TANGRAM = (
 The core knows no tangram: docs/decisions/0145."""
 LAYERS = {
     "schemas": "documents > *",
-    "services": "commandline > console control doctor generation realizer recognition study > tangram"
+    "services": "commandline > console control doctor generation perception realizer recognition study"
+    " > tangram"
     " > simulation > client > recording > reports requests > runtime > bus > text",
     "services/text": "ear > marks > pieces > patterns > ends listening",
     "services/bus": "memory zenoh > certificates > interface > subscription > samples > config deadlines journal"
     " keyring",
     "services/control": "mujoco reachy_mini torso > figure service testing > bases calibrating serving voice"
     " > contract > config motion",
+    "services/perception/hearing": "service > listening microphone recognizers > child recognizing sound > voice"
+    " > config",
     "services/commandline": "look robot study talk > app bodies embedding > shell",
     "services/client": "language_models > robot > orders > feeds people > chunking event_stream inputs",
     "services/generation": "service > intake > fragments > performance > acts > fragment_check pipeline"
@@ -75,7 +78,7 @@ THREADS = {"threading", "_thread", "concurrent", "multiprocessing"}
 THREAD_CALLS = {"to_thread", "run_in_executor", "Thread", "ThreadPoolExecutor"}
 
 WEB = {"starlette", "uvicorn"}
-WITH_WEB = {"services/console/web/server.py"}
+WITH_WEB = {"services/console/web/server.py", "services/console/web/sounds.py"}
 """The only file with a web stack. It is the exception to "no threads": it reads the files of the page on worker
 threads, which touch nothing of ours; pages, frames and orders stay on the one loop."""
 

@@ -56,10 +56,10 @@ def test_the_wheel_installs_one_importable_name_and_no_links(installed: Path) ->
     assert not any(path.is_symlink() for path in installed.rglob("*"))
     assert (installed / "engage_hri/py.typed").is_file()
     assert list((installed / "engage_hri/schemas/exported").glob("*.json"))
-    page = ROOT / "services/console/web/page"
-    assert {path.name for path in (installed / "engage_hri/services/console/web/page").iterdir()} == {
-        path.name for path in page.iterdir()
-    }
+    for page in ("services/console/web/page", "services/console/stage"):
+        assert {path.name for path in (installed / "engage_hri" / page).iterdir()} == {
+            path.name for path in (ROOT / page).iterdir()
+        }
 
 
 def test_programs_find_ours_beside_packages_of_the_same_name(installed: Path, tmp_path: Path) -> None:

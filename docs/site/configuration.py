@@ -14,7 +14,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "configuration.md"
 SECTIONS = {
     "bus": "bus", "generation": "generation", "realizer": "realizer", "recognition": "recognition",
-    "control": "control", "simulation": "tangram/people", "collaboration": "tangram/collaboration",
+    "control": "control", "hearing": "perception/hearing",
+    "simulation": "tangram/people", "collaboration": "tangram/collaboration",
 }  # fmt: skip
 """Folder of each section."""
 HEAD = """\

@@ -34,6 +34,10 @@ HERE = ("localhost", "127.0.0.1", "::1")
 _HOST = re.compile(r"[A-Za-z0-9_*]([A-Za-z0-9_.-]*[A-Za-z0-9_])?")
 
 
+OWN_DAYS = 825
+"""Days for which a server's own certificate is valid: browsers take none that is valid for longer."""
+
+
 class Shown(NamedTuple):
     """A certificate that is in a folder. is_revoked: routers that have the list of this folder do not let it in."""
 
@@ -77,6 +81,23 @@ def initialize(folder: Path, robot: str, holders: Sequence[tuple[str, str]], hos
     for holder in every:
         _give(folder, holder, generate_private_key(SECP256R1()), days, addresses if holder.role == ROUTER else None)
     _let_in(folder, every)
+
+
+def write_own(path: Path, hosts: Iterable[str]) -> None:
+    """Write a server's own certificate, for which nobody else vouches, and its private key into one file.
+
+    hosts: names and addresses under which it is reached, besides those of its own machine. Raises InputRefused for
+    one that is none, and OSError.
+    """
+    key, itself = generate_private_key(SECP256R1()), _name("Engage window")
+    certificate = (
+        _builder(itself, itself, key, OWN_DAYS)
+        .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+        .add_extension(x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH]), critical=False)
+        .add_extension(_alternatives((*HERE, *hosts)), critical=False)
+        .sign(key, hashes.SHA256())
+    )
+    _write(path, certificate.public_bytes(serialization.Encoding.PEM) + _private(key), 0o600)
 
 
 def add(folder: Path, holders: Sequence[tuple[str, str]], days: int) -> None:

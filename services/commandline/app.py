@@ -42,6 +42,8 @@ FAMILIES: dict[str, dict[str, str]] = {
         "plan": "Check a block and print its Petri net and predicted schedule, or why its references are made so. "
         "Nothing moves.",
         "bml": "Print the BML that a turn fragment becomes, or a block in another dialect. Nothing moves.",
+        "check-recognizer": "Let a recognizer of speech hear spoken files, and tell its errors, delay and processor "
+        "time.",
         "tool": "Print the tool by which a language model speaks through the robot, for its API.",
     },
     "study": {

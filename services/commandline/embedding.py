@@ -95,7 +95,11 @@ async def play_tangram(
     hub: the bus on which they run, for others to look on; None: one in memory. record: a file for all that is said.
     """
     async with MemoryHub(config.robot, decodes=False) if hub is None else nullcontext(hub) as hub:
-        bound = services(config, *roster.NAMES)
+        bound = services(config, *roster.PLAY)
         kept = recording(hub.join("record"), record, (keys.EVERYTHING,), {}) if record else nullcontext()
-        async with kept, following(hub.join("console"), sinks), running(hub, bound) as over:
-            await over.wait()
+        bus = hub.join("console")
+        try:
+            async with kept, following(bus, sinks), running(hub, bound) as over:
+                await over.wait()
+        finally:
+            await bus.leave()

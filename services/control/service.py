@@ -8,6 +8,7 @@ import asyncio
 import logging
 from contextlib import aclosing, nullcontext
 from functools import partial
+from itertools import count
 
 from msgspec import Struct
 
@@ -16,6 +17,7 @@ from engage_hri.schemas.body_faults import BodyFault, SwitchFaults
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.recognition import SamePeople
 from engage_hri.schemas.requests import Request
+from engage_hri.schemas.sound import SoundFrame
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import COVERED_FOR, World
 from engage_hri.services.bus import journal
@@ -29,6 +31,7 @@ from engage_hri.services.control.contract.body import (
     DriverBroken,
     MovementAuthority,
     Spoke,
+    SpokenSound,
 )
 from engage_hri.services.control.contract.calibration import calibrated
 from engage_hri.services.control.contract.refusals import VOICE_ADVICE
@@ -130,12 +133,16 @@ class _Control:
         """What the eyes rest on, as the intake was told."""
         body.on_fault = lambda fault: self._take(steps.BodyComplained(fault))
         body.on_recovery = self._reassure
+        body.on_sound = self._tell_sound
+        body.wants_sound = partial(bus.is_heard, keys.ROBOT_SOUND)
+        self._sounds = count()
         calibration = calibrated(body, config.calibration)
         self.questions = Questions(config, body, calibration, self._intake, self._warn)
         self._shown = Shown(bus, body, config.state_rate, self._note_eyes, calibration)
 
     def begin(self, covered_for: Seconds) -> None:
         """Tell that nothing goes on yet, and look at the body for the first time."""
+        self._body.wants_sound()  # the bus looks from now on who listens
         begun = steps.ControlBegan(able=self._body.capabilities, covered_for=covered_for, faults=self._body.faults)
         self._take(begun)
         self._shown.look()
@@ -233,6 +240,12 @@ class _Control:
     def _reassure(self, text: str) -> None:
         """Tell whoever sees the log that something is over of which it was warned."""
         journal.alert(self._bus.log, "control: %s", text)
+
+    def _tell_sound(self, sound: SpokenSound) -> None:
+        """Tell whoever listens what the voice is about to be heard of."""
+        at = self._bus.stamp(sound.at)
+        frame = SoundFrame(at=at, rate=sound.rate, samples=sound.samples, number=next(self._sounds))
+        self._bus.publish(keys.ROBOT_SOUND, frame)
 
     # -- what the body does -------------------------------------------------------------------------------------
 

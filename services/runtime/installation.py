@@ -72,7 +72,9 @@ def _from_here(path: Path) -> str:
 if TYPE_CHECKING:
     from importlib.metadata import Distribution, EntryPoint
 
-GROUPS = BODIES, VOICES, SERVICES = "engage.bodies", "engage.voices", "engage.services"
+GROUPS = BODIES, VOICES, SERVICES, RECOGNIZERS = (
+    "engage.bodies", "engage.voices", "engage.services", "engage.recognizers",
+)  # fmt: skip
 
 
 class Offer(NamedTuple):

@@ -2,6 +2,7 @@
 
 import asyncio
 from functools import partial
+from pathlib import Path
 
 import pytest
 import zenoh
@@ -18,10 +19,12 @@ from engage_hri.services.client.robot import Robot
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.console.follow import following
+from engage_hri.services.perception.hearing.config import HearingConfig
 from engage_hri.services.runtime.service import Ready, running
 from engage_hri.services.simulation.still import show_world, table_world
 from engage_hri.services.tangram.people.config import SimulationConfig
 from tests.access.spy import Flow, SpyHub
+from tests.perception.spoken import spoken, write_wav
 
 ROLES = {
     "alice": "manager", "alice-log": "manager", "viewer": "observer", "guard": "operator", "camera": "perception",
@@ -39,7 +42,7 @@ def is_granted(row: Row, flow: Flow) -> bool:
 async def tangram(flows: set[Flow], simulation: SimulationConfig) -> None:
     """The whole task, watched."""
     config, over = Config(simulation=simulation), asyncio.Event()
-    services = {name: roster.service(name, config) for name in roster.NAMES}
+    services = {name: roster.service(name, config) for name in roster.PLAY}
     task = services["collaboration"]
 
     async def collaboration(bus: Bus, ready: Ready) -> None:
@@ -50,6 +53,15 @@ async def tangram(flows: set[Flow], simulation: SimulationConfig) -> None:
         watching = following(hub.join("viewer"), [lambda message, at: None])
         async with watching, running(hub, {**services, "collaboration": collaboration}), asyncio.timeout(LIMIT):
             await over.wait()
+
+
+async def listen(flows: set[Flow], folder: Path) -> None:
+    """A service that hears a file, in which somebody speaks."""
+    path = write_wav(folder / "said.wav", spoken("yes").samples)
+    config = Config(hearing=HearingConfig(source=str(path)))
+    services = {name: roster.service(name, config) for name in ("recognition", "hearing")}
+    async with SpyHub(flows, ROLES) as hub, running(hub, services) as over:
+        await over.wait()
 
 
 async def visit(flows: set[Flow]) -> None:
@@ -98,7 +110,7 @@ async def visit(flows: set[Flow]) -> None:
 
 
 @pytest.fixture(scope="module")
-def flows() -> set[Flow]:
+def flows(tmp_path_factory: pytest.TempPathFactory) -> set[Flow]:
     """All flows of all these runs."""
     from tests.conftest import virtual_loop
 
@@ -108,6 +120,7 @@ def flows() -> set[Flow]:
         await tangram(found, SimulationConfig())
         await tangram(found, SimulationConfig(perception="raw"))
         await visit(found)
+        await listen(found, tmp_path_factory.mktemp("heard"))
 
     with asyncio.Runner(loop_factory=virtual_loop) as runner:
         runner.run(everything())
@@ -116,6 +129,7 @@ def flows() -> set[Flow]:
 
 def test_nothing_flows_that_the_table_denies(flows: set[Flow]) -> None:
     assert len(flows) > 100
+    assert {"publishes", "subscribes", "serves"} <= {flow.does for flow in flows if flow.name == "hearing"}
     assert not sorted(flow for flow in flows if not any(is_granted(row, flow) for row in TABLE))
 
 

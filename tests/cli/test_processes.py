@@ -12,7 +12,7 @@ import pytest
 
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.commandline.shell.process import UNREADY
-from engage_hri.services.commandline.shell.roster import NAMES, ROBOT
+from engage_hri.services.commandline.shell.roster import PLAY, ROBOT
 from tests.bus.places import free_endpoint
 from tests.cli.command import FRAGMENT, GOOD_BLOCK, start, threads
 
@@ -199,18 +199,18 @@ async def test_output_that_finds_no_room_is_a_failure_in_one_line() -> None:
 
 async def test_each_service_runs_alone_with_only_zenohs_threads_and_stops_on_a_signal() -> None:
     arguments = ("--robot", "alone", "--listen", "tcp/127.0.0.1:0")
-    services = {name: await start("run", name, *arguments) for name in NAMES}
+    services = {name: await start("run", name, *arguments) for name in PLAY}
     try:
         found = {}
         for name, process in services.items():
             await line(process, f"{name} is ready")
             found[name] = await strangers(process.pid)
 
-        assert found == {name: [] for name in NAMES}
+        assert found == {name: [] for name in PLAY}
     finally:
         codes = {name: await stopped(process, signal.SIGTERM) for name, process in services.items()}
 
-    assert codes == dict.fromkeys(NAMES, 0)
+    assert codes == dict.fromkeys(PLAY, 0)
 
 
 async def test_up_performs_what_is_played_and_ctrl_c_ends_all_of_it(endpoint: str, tmp_path: Path) -> None:

@@ -139,6 +139,17 @@ async def test_a_typed_line_is_words_alone(hub: MemoryHub) -> None:
     assert (words.began, words.ended) == (words.at, None)
 
 
+async def test_words_of_the_next_person_of_a_name_are_no_news_of_what_the_last_one_said(hub: MemoryHub) -> None:
+    async with scene(hub) as told:
+        for _ in range(2):
+            async with perceive("ann", hub=hub, name="desk") as ann:
+                await ann.type("hello")
+            await asyncio.sleep(1.0)
+
+    first, second = [each.id for each in told if isinstance(each, Utterance)]
+    assert first != second
+
+
 async def test_who_leaves_ends_what_goes_on_and_does_no_more(hub: MemoryHub) -> None:
     async with scene(hub) as told, perceive("ann", hub=hub) as ann:
         ann.begin("speak")

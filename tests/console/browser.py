@@ -141,13 +141,16 @@ async def at_port(port: int) -> AsyncIterator[Browser]:
 
 
 @contextmanager
-def running(folder: Path) -> Iterator[int]:
-    """A browser with a profile in `folder`, while the body of `with` runs. Gives the port of its protocol."""
+def running(folder: Path, *flags: str) -> Iterator[int]:
+    """A browser with a profile in `folder`, while the body of `with` runs. Gives the port of its protocol.
+
+    flags: more than it has in all tests.
+    """
     assert CHROMIUM is not None
     told = folder / "told"
     with told.open("wb") as log:
         process = subprocess.Popen(
-            (CHROMIUM, *FLAGS, f"--user-data-dir={folder / 'profile'}", "about:blank"),
+            (CHROMIUM, *FLAGS, *flags, f"--user-data-dir={folder / 'profile'}", "about:blank"),
             stdout=subprocess.DEVNULL, stderr=log,
         )  # fmt: skip
     try:

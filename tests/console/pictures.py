@@ -12,6 +12,7 @@ from tests.console.windows import URL, engage
 FOLDER = Path(__file__).parents[2] / "docs" / "console"
 PLACE = 27.5
 """Place in the recording, in seconds: the robot points."""
+STAGES = (("phone", (390, 844), False), ("laptop", (1366, 768), False), ("dark", (390, 844), True))
 SIZES = ((1920, 1200), (1280, 1000), (400, 1400))
 
 
@@ -48,6 +49,21 @@ async def take(url: str, port: int) -> None:
         (FOLDER / "net.png").write_bytes(await page.picture(whole=False))
 
 
+async def take_stage(url: str, port: int) -> None:
+    """Sit down at the stage, and take pictures while the robot speaks: a phone, a laptop, and a phone in the dark."""
+    async with browser.at_port(port) as running, running.page() as page:
+        await page.look(390, 844)
+        await page.go(url)
+        await page.until("window.stage?.state.scene?.body && window.stage.shown.isStill", 60)
+        (FOLDER / "stage-welcome.png").write_bytes(await page.picture(whole=False))
+        await page.value("document.querySelector('.sit').click()")
+        for name, (width, height), dark in STAGES:
+            await page.look(width, height, dark=dark)
+            await page.until("document.querySelectorAll('.bubble.robot.on span').length > 4", 60)
+            await page.value("new Promise((done) => setTimeout(done, 1500))")
+            (FOLDER / f"stage-{name}.png").write_bytes(await page.picture(whole=False))
+
+
 def main() -> None:
     """Run a robot, its window and a browser, and take the pictures."""
     FOLDER.mkdir(exist_ok=True)
@@ -62,6 +78,8 @@ def main() -> None:
                 url = waited(window, folder / "console", URL)
                 with engage(folder / "record", "record", str(file), "--connect", endpoint):
                     asyncio.run(take(url, port))
+            with engage(folder / "demo", "demo", "--you", BROWSER="true %s") as demo:
+                asyncio.run(take_stage(waited(demo, folder / "demo", rb"the stage: (http://[^\s]+)"), port))
             with engage(folder / "recorded", "console", "--recording", str(file), "--port", "0") as window:
                 asyncio.run(take_recording(waited(window, folder / "recorded", URL), port))
 

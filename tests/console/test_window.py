@@ -349,7 +349,7 @@ async def test_the_demo_shows_itself_and_takes_its_window_with_it(
 ) -> None:
     """With a simulated person, and with the visitor in its place."""
     with engage(tmp_path / "demo", "demo", "--window", *you, BROWSER="true %s") as demo:
-        url = waited(demo, tmp_path / "demo", rb"the window: (http://[^\s]+)")
+        url = waited(demo, tmp_path / "demo", rb"the workshop: (http://[^\s]+)")
         async with opened(place, url) as page:
             gaze = "JSON.stringify(window.engage.state.scene.body.gaze)"
             first = await page.value(gaze)

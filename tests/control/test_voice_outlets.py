@@ -63,9 +63,7 @@ def listening(voice: Voice) -> list[Fault]:
 
 
 def file_of(voice: Voice) -> WavFile:
-    outlet = voice._outlet.outlets[-1]
-    assert isinstance(outlet, WavFile)
-    return outlet
+    return next(each for each in voice._outlet.outlets if isinstance(each, WavFile))
 
 
 async def said(voice: Voice, text: str) -> list[str]:
@@ -344,6 +342,16 @@ def test_a_pw_cat_without_raw_sound_is_not_taken(
     else:
         with pytest.raises(InputRefused, match="no option --raw, it is too old"):
             player.found(VoiceSettings())
+
+
+def test_without_any_player_there_is_no_device_unless_one_was_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+
+    assert player.found(VoiceSettings()) is None
+    with pytest.raises(InputRefused, match="no program here plays sound: tried aplay"):
+        player.found(VoiceSettings(device="aplay"))
 
 
 async def test_a_voice_that_is_made_mute_says_no_more_and_fails() -> None:

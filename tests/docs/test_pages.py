@@ -45,6 +45,8 @@ EXCUSED = {
     "cc examples/connection_events.c -DZENOH_LINUX -lzenohpico -o events": "tests/cli/test_c_example.py",
     "./events tcp/127.0.0.1:7447": "the same",
     "make demo ARGS=--you": "waits for somebody to sit down; tests/console/test_window.py sits down",
+    "engage run hearing": "needs a microphone; tests/perception/test_hearing.py has files",
+    "engage run hearing --from talk.wav": "the same",
     "make reachy-mini": "takes a minute and a half; .ci/run does it",
 }
 """Commands that do not run here, and why."""
@@ -59,6 +61,8 @@ ELSEWHERE = {
     ("docs/recognition.md", "diff"): "tests/recognition/test_new_kind.py",
     ("docs/bus.md", "mermaid"): "tests/requests/test_request_model.py",
     ("docs/reachy-mini.md", "sh"): "tests/control/reachy_mini/test_docs.py",
+    ("docs/hearing.md", "sh"): "tests/perception/test_hearing_page.py",
+    ("docs/hearing.md", "python"): "tests/perception/test_hearing_page.py",
     ("docs/people.md", "python"): "tests/client/test_people_page.py",
     ("docs/console.md", "nginx"): "tests/console/test_path.py",
     ("docs/hostile.md", "sh"): "tests/hostile/test_command.py",

@@ -39,7 +39,7 @@ async def tangram(
     """The whole task, recorded. more: further participants. Returns what a subscription got of it."""
     live: list[Received] = []
     async with MemoryHub(config.robot) as hub:
-        services = {name: roster.service(name, config) for name in roster.NAMES}
+        services = {name: roster.service(name, config) for name in roster.PLAY}
         services |= more
         inbox = hub.join("viewer").subscribe(keys.EVERYTHING, capacity=10**6)
         async with recording_to(path, hub), following(hub.join("console"), sinks), running(hub, services) as over:

@@ -45,20 +45,20 @@ def as_plain(value: object) -> Any:
 
 
 async def test_the_settings_of_every_service_are_in_a_recording(tmp_path: Path) -> None:
-    services = {name: roster.service(name, OTHER) for name in roster.NAMES}
+    services = {name: roster.service(name, OTHER) for name in roster.PLAY}
     async with MemoryHub() as hub, recording_to(tmp_path / "a.mcap", hub), running(hub, services):
         await asyncio.sleep(1.0)
 
     found = {life.told.participant: json.loads(life.told.settings) for life in settings_of(read(tmp_path / "a.mcap"))}
 
     assert {name: settings[name] for name, settings in found.items()} == {
-        name: as_plain(getattr(OTHER, name)) for name in roster.NAMES
+        name: as_plain(getattr(OTHER, name)) for name in roster.PLAY
     }
     assert found["generation"]["covered_for"] == found["control"]["covered_for"] == 7.5
 
 
 async def test_a_recorder_that_comes_late_has_them_too(tmp_path: Path) -> None:
-    services = {name: roster.service(name, OTHER) for name in roster.NAMES}
+    services = {name: roster.service(name, OTHER) for name in roster.PLAY}
     async with MemoryHub() as hub, running(hub, services):
         await asyncio.sleep(60.0)
         async with recording_to(tmp_path / "a.mcap", hub):
@@ -66,7 +66,7 @@ async def test_a_recorder_that_comes_late_has_them_too(tmp_path: Path) -> None:
 
     found = settings_of(read(tmp_path / "a.mcap"))
 
-    assert {life.told.participant for life in found} == set(roster.NAMES)
+    assert {life.told.participant for life in found} == set(roster.PLAY)
     assert {(life.since, life.number) for life in found} == {(0.0, 1)}
 
 
@@ -157,7 +157,7 @@ def test_what_is_exported_is_toml_that_says_the_same(settings: dict[str, Any], t
 
 def test_an_exported_file_configures_the_same_again(tmp_path: Path) -> None:
     path = tmp_path / "settings.toml"
-    all_sections = {name: as_plain(getattr(OTHER, name)) for name in roster.NAMES} | {"covered_for": 7.5}
+    all_sections = {name: as_plain(getattr(OTHER, name)) for name in roster.PLAY} | {"covered_for": 7.5}
 
     path.write_text(configuration(settings_of(kept(all_sections)), "a.mcap"))
 

@@ -63,7 +63,7 @@ async def test_so_are_those_of_a_recorder_that_comes_late_and_ends_early(
     tmp_path: Path, begin: float, seconds: float
 ) -> None:
     config = Config(simulation=SimulationConfig(human="stochastic", seed=2))
-    services = {name: roster.service(name, config) for name in roster.NAMES}
+    services = {name: roster.service(name, config) for name in roster.PLAY}
     async with MemoryHub() as hub, running(hub, services):
         await asyncio.sleep(begin)
         async with recording_to(tmp_path / "a.mcap", hub):

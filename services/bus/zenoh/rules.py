@@ -82,7 +82,7 @@ def _grants(holder: Holder) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     yield "ingress", "declare_liveliness_subscriber", seen
     yield "ingress", "liveliness_query", seen
     yield "egress", "put", (*subscribes, *pulses)
-    yield "egress", "declare_subscriber", (keys.EVERYTHING, keys.ANY_OWN)
+    yield "egress", "declare_subscriber", (keys.EVERYTHING, keys.ANY_OWN, keys.ROBOT_SOUND, keys.ANY_SOUND)
     yield "egress", "declare_queryable", (keys.EVERYTHING, keys.ANY_OWN)
     yield "egress", "query", (*serves, access.ANY_STATUS, keys.ANY_OWN, *past)
     yield "egress", "reply", (*asks, *subscribes, keys.ANY_OWN)

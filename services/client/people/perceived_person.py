@@ -56,7 +56,8 @@ class PerceivedPerson:
         self._bus = bus
         self._actions = PersonActions(person)
         self._perceived = PerceivedActions(bus)
-        self._utterances = Utterances(person, bus.run)
+        # Somebody of this name may have been here before, and told by the same program.
+        self._utterances = Utterances(person, f"{bus.run}-{round(bus.now() * 1000)}")
         self._world = SharedWorld(bus.name)
         self._own: dict[str, Entity] = {}
         """What this program brought into the world: the person, if nobody else tells of it, hands, things."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.services.commandline.look.window import TOKEN, hosts, served, web
+from engage_hri.services.commandline.look.window import TOKEN, hosts, served, stage_page, web, workshop_page
 from engage_hri.services.commandline.shell.failing_output import complain
 from engage_hri.services.commandline.shell.options import Connected, Shown
 from engage_hri.services.commandline.shell.process import DONE, forever, run_until_signal, unique_name
@@ -80,7 +80,7 @@ def main(options: Options) -> int:
 async def _play(options: Options, recording: "Recording") -> None:
     """Show a recording: without a bus, and for whoever looks."""
     app = web().recorded(recording, hosts(options))
-    async with served(app, options, "", _tell, role="observer", port=options.port, opens=options.browser):
+    async with served(app, options, {"": ""}, _tell, role="observer", port=options.port, opens=options.browser):
         await forever()
 
 
@@ -98,16 +98,18 @@ async def _show(options: Options, config: RobotConfig, things: tuple[Thing, ...]
         async with window(hub, bus, Script(things), keyed=bool(config.bus.keys)) as shown:
             bus.declare_alive()
             app = server.application(shown, hosts(options), token, options.pages)
-            given = token if bus.role in RIGHTS else ""
+            pages = {workshop_page(token if bus.role in RIGHTS else ""): ""}
+            if "seat" in RIGHTS.get(bus.role, ()):
+                pages[stage_page(token)] = "the stage, for visitors: "
             async with (
-                served(app, options, given, _tell, role=options.role, port=options.port, opens=options.browser),
+                served(app, options, pages, _tell, role=options.role, port=options.port, opens=options.browser),
                 hinting(bus, config.bus.connect, tell=shown.warn),
             ):
                 await forever()
 
 
-def _tell(url: str) -> None:
-    print(url, flush=True)
+def _tell(line: str) -> None:
+    print(line, flush=True)
 
 
 def kept_token(path: Path) -> str:

@@ -1,16 +1,18 @@
 """Command `engage demo`: the whole system in this process plays the anchor tangram with a simulated person."""
 
 import asyncio
+from collections.abc import Callable, Coroutine
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
 
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline.embedding import play_tangram
 from engage_hri.services.commandline.look.window import can_open, web, windowed
@@ -24,8 +26,15 @@ from engage_hri.services.console.follow import Sink
 from engage_hri.services.console.terminal import tally
 from engage_hri.services.console.terminal.live import Tallying, scene_view
 
+if TYPE_CHECKING:
+    from engage_hri.services.console.web.service import WindowServer
+
 FOR_YOU = ("collaboration.mode=task",)
 """Settings for somebody who knows no transcript: the robot says good of what is right, and sees which piece it is."""
+EMPTY: Seconds = 5.0
+"""Time without anybody before the robot after which a kiosk begins anew."""
+LOOK: Seconds = 0.5
+"""Time between two looks whether somebody is there."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +50,13 @@ class Options(Written, Simulated, Embodied, Shown):
     ] = None
     you: Annotated[
         bool, typer.Option("--you", help="You are the person: take the seat in the browser, and lay the pieces.")
+    ] = False
+    kiosk: Annotated[
+        bool,
+        typer.Option(
+            "--kiosk",
+            help="For an open day: as --you, again and again. The page begins anew for the next visitor by itself.",
+        ),
     ] = False
 
     people: Annotated[
@@ -58,20 +74,26 @@ class Options(Written, Simulated, Embodied, Shown):
     ] = None
 
     @property
+    def is_for_visitors(self) -> bool:
+        """True if whoever sits down in the browser is the person."""
+        return self.you or self.kiosk
+
+    @property
     def overrides(self) -> tuple[str, ...]:
         """Settings of the options."""
-        you = ("simulation.human=none",) if self.you else ()
+        you = ("simulation.human=none",) if self.is_for_visitors else ()
         party = ("simulation.human=party", f"simulation.people={self.people}", "collaboration.mode=host")
         return (*super().overrides, *you, *(party if self.people else ()))
 
 
 def main(options: Options) -> int:
-    config = options.read(Config, defaults=FOR_YOU if options.you else TRANSCRIPT)
+    config = options.read(Config, defaults=FOR_YOU if options.is_for_visitors else TRANSCRIPT)
     _check(options)
     with Outputs(options.events, options.feedback) as outputs:
         console = outputs.console(quiet=options.quiet)
         live = console.is_terminal and not options.virtual_time and not options.quiet
-        window = can_open(live) if options.window is None and not options.you else options.window is not False
+        may = options.window is None and not options.is_for_visitors
+        window = can_open(live) if may else options.window is not False
         if window:
             web()
         result = run(demonstrate(config, outputs, console, live, options, window), virtual_time=options.virtual_time)
@@ -83,13 +105,19 @@ def _check(options: Options) -> None:
     """Refuse what needs a window that cannot be, or a file that cannot be written. Raises InputRefused."""
     if options.record is not None:
         needed()
-    for option, given in (("--window", options.window), ("--you", options.you)):
+    for option, given in (("--window", options.window), ("--you", options.you), ("--kiosk", options.kiosk)):
         if given and options.virtual_time:
             reason, advice = "the clock of a window cannot jump", "leave out --virtual-time"
             raise InputRefused(Fault(reason=reason, where=option, advice=advice))
-    if options.you and options.window is False:
-        raise InputRefused(Fault(reason="the seat is in the window", where="--you", advice="leave out --no-window"))
-    for option, taken in (("--you", options.you), ("--human", options.human)):
+    for option, given in (("--you", options.you), ("--kiosk", options.kiosk)):
+        if given and options.window is False:
+            raise InputRefused(
+                Fault(reason="the seat is in the window", where=option, advice="leave out --no-window")
+            )
+    if options.kiosk and options.record is not None:
+        reason, advice = "what strangers do there is in no recording", "leave it out"
+        raise InputRefused(Fault(reason=reason, where="--record", advice=advice))
+    for option, taken in (("--you", options.you), ("--kiosk", options.kiosk), ("--human", options.human)):
         if options.people and taken:
             raise InputRefused(Fault(reason="the people of --people sit there", where=option, advice="leave it out"))
 
@@ -102,8 +130,32 @@ async def demonstrate(
     tallying = Tallying(began)
     tell = partial(console.print, highlight=False, markup=False)
     async with MemoryHub(config.robot, decodes=False) as hub:
-        beside = windowed(hub, options, began, tell) if window else nullcontext()
+        beside = windowed(hub, options, began, tell, kiosk=options.kiosk) if window else nullcontext()
         with scene_view(console, config.robot, began, live) as show:
-            async with beside:
-                await play_tangram(config, (show, tallying, outputs), hub, options.record)
+            async with beside as shown:
+                play = partial(play_tangram, config, (show, tallying, outputs), hub, options.record)
+                await (_again_and_again(play, shown) if options.kiosk and shown else play())
     return tallying.tally
+
+
+async def _again_and_again(play: Callable[[], Coroutine[Any, Any, None]], shown: "WindowServer") -> None:
+    """Play for one visitor after another, until cancelled: anew when the task is over, or its visitor has left."""
+    while True:
+        playing, leaving = asyncio.create_task(play()), asyncio.create_task(_left(shown))
+        try:
+            await asyncio.wait((playing, leaving), return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            playing.cancel()
+            leaving.cancel()
+            await asyncio.wait((playing, leaving))
+        if not playing.cancelled():
+            playing.result()
+
+
+async def _left(shown: "WindowServer") -> None:
+    """Wait until somebody was there, and nobody has been for a while."""
+    last: float | None = None
+    while last is None or shown.bus.now() - last < EMPTY:
+        if shown.picture.present:
+            last = shown.bus.now()
+        await asyncio.sleep(LOOK)

@@ -5,7 +5,7 @@ import os
 import secrets
 import sys
 import webbrowser
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager
 from importlib.util import find_spec
 from socket import gethostname
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Hub
+from engage_hri.services.commandline.look.https import server_keys
 from engage_hri.services.commandline.shell.failing_output import complain
 from engage_hri.services.commandline.shell.options import Shown
 from engage_hri.services.commandline.shell.process import unique_name
@@ -22,6 +23,7 @@ from engage_hri.services.runtime.installation import extra_command
 
 if TYPE_CHECKING:
     from engage_hri.services.console.web.guard import Hosts
+    from engage_hri.services.console.web.service import WindowServer
 
 NEEDED = ("starlette", "uvicorn", "nicegui")
 """Packages without which there is no window."""
@@ -51,27 +53,42 @@ def web() -> ModuleType:
     return server
 
 
+def names(shown: Shown) -> tuple[str, ...]:
+    """Names by which the page may be called."""
+    own = gethostname()
+    more = () if shown.host in LOCAL else (shown.host, own, f"{own}.local")
+    return (*LOCAL, *more, *(shown.called or ()))
+
+
 def hosts(shown: Shown) -> "Hosts":
-    """Names by which the page may be called: else a page of others could call it by a name of theirs."""
+    """All that the page may be called: else a page of others could call it by a name of theirs."""
     from engage_hri.services.console.web.guard import Hosts
 
-    if shown.host in LOCAL:
-        return Hosts((*LOCAL, *(shown.called or ())))
-    own = gethostname()
-    return Hosts((*LOCAL, shown.host, own, f"{own}.local", *(shown.called or ())), addresses=True)
+    return Hosts(names(shown), addresses=shown.host not in LOCAL)
 
 
 @asynccontextmanager
 async def served(
-    app: Any, shown: Shown, token: str, tell: Callable[[str], None], *, role: str, port: int = 0, opens: bool = True
+    app: Any,
+    shown: Shown,
+    pages: Mapping[str, str],
+    tell: Callable[[str], None],
+    *,
+    role: str,
+    port: int = 0,
+    opens: bool = True,
 ) -> AsyncIterator[None]:
-    """Serve a page while the body of `async with` runs. Raises RunFailed if the port is taken.
+    """Serve pages while the body of `async with` runs.
 
-    tell: gets its address. role: of whoever has the token. port: 0: any that is free. opens: show it in the browser.
+    Raises RunFailed if the port is taken, and InputRefused if there is no certificate where `--https` says.
+
+    pages: the address of each below the server's, and what is said before it. tell: gets a line for each.
+    role: of whoever has the token. port: 0: any that is free. opens: show the first in the browser.
     """
+    keys = server_keys(shown.https, names(shown)) if shown.https else None
     async with AsyncExitStack() as stack:
         try:
-            port = await stack.enter_async_context(web().serving(app, shown.host, port))
+            port = await stack.enter_async_context(web().serving(app, shown.host, port, keys))
         except OSError as error:
             is_taken = error.errno == errno.EADDRINUSE
             free = "is another window there? --port 0 takes any that is free"
@@ -79,22 +96,27 @@ async def served(
             reason = os.strerror(error.errno) if error.errno else str(error)
             raise RunFailed(Fault(reason=reason, where=f"{shown.host}:{port}", advice=advice)) from error
         host = "127.0.0.1" if shown.host in ("0.0.0.0", "::") else shown.host
-        url = f"http://{f'[{host}]' if ':' in host else host}:{port}/" + (f"?token={token}" if token else "")
-        tell(url)
+        home = f"http{'s' if keys else ''}://{f'[{host}]' if ':' in host else host}:{port}/"
+        for page, called in pages.items():
+            tell(f"{called}{home}{page}")
         if shown.host not in LOCAL:
-            seen = f"everybody who reaches {shown.host} sees all of this robot, and the people before it, unencrypted"
-            more = f"; who has the token in the address above takes part as {role}"
+            seen = f"everybody who reaches {shown.host} sees all of this robot, and the people before it"
+            seen += "" if keys else ", unencrypted"
+            more = f"; who has the token in the address of the workshop takes part as {role}"
             complain(seen if role == "observer" else seen + more)
         if opens:
-            webbrowser.open(url)
+            webbrowser.open(home + next(iter(pages)))
         yield
 
 
 @asynccontextmanager
-async def windowed(hub: Hub, shown: Shown, began: Seconds, tell: Callable[[str], None]) -> AsyncIterator[None]:
+async def windowed(
+    hub: Hub, shown: Shown, began: Seconds, tell: Callable[[str], None], *, kiosk: bool = False
+) -> AsyncIterator["WindowServer"]:
     """Show all that goes on at this hub in the browser, while the body of `async with` runs.
 
-    began: the instant from which the page counts its seconds. tell: gets the address of the window.
+    began: the instant from which the page counts its seconds. tell: gets the addresses of stage and workshop.
+    kiosk: the stage begins anew when its visitor has gone.
     """
     server = web()
     from engage_hri.services.console.web.orders import Script
@@ -104,5 +126,18 @@ async def windowed(hub: Hub, shown: Shown, began: Seconds, tell: Callable[[str],
     async with window(hub, bus, Script(()), began=began) as following:
         bus.declare_alive()
         app = server.application(following, hosts(shown), token)
-        async with served(app, shown, token, lambda url: tell(f"the window: {url}"), role=bus.role):
-            yield
+        stage = stage_page(token) + ("&kiosk" if kiosk else "")
+        async with served(
+            app, shown, {stage: "the stage: ", workshop_page(token): "the workshop: "}, tell, role=bus.role
+        ):
+            yield following
+
+
+def workshop_page(token: str) -> str:
+    """Address of the workshop below that of the server. token: empty: its visitors only look on."""
+    return f"?token={token}" if token else ""
+
+
+def stage_page(token: str) -> str:
+    """Address of the stage, whose visitors sit down and do no more. token: that of the workshop."""
+    return f"stage?token={web().stage_token(token)}"

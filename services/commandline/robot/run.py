@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import typer
+from msgspec import json
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.bus.interface import Hub
@@ -20,7 +21,7 @@ from engage_hri.services.commandline.shell.process import (
     unique_name,
     until_closed,
 )
-from engage_hri.services.commandline.shell.roster import ROBOT, complete
+from engage_hri.services.commandline.shell.roster import ROBOT, SENSES, complete
 from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.runtime.service import Service, running
 
@@ -38,7 +39,17 @@ class Options(Embodied, Listening):
             autocompletion=lambda: list(roster.NAMES),
         ),
     ]
+    source: Annotated[
+        str | None,
+        typer.Option("--from", metavar="SOURCE", help="Of hearing: a WAV file, or a program that records (arecord)."),
+    ] = None
     attended: Annotated[bool, typer.Option("--attended", hidden=True)] = False
+
+    @property
+    def overrides(self) -> tuple[str, ...]:
+        """Settings of the options, which are stronger than `--set`."""
+        own = (f"hearing.source={json.encode(self.source).decode()}",) if self.source else ()
+        return (*super().overrides, *own)
 
 
 def ready_line(name: str) -> str:
@@ -51,9 +62,11 @@ def main(options: Options) -> int:
     names = roster.group(options.services)
     if (options.body or options.voice) and "control" not in names:
         raise InputRefused(Fault(reason="--body and --voice are for control", advice="engage run control --body ..."))
+    if options.source and "hearing" not in names:
+        raise InputRefused(Fault(reason="--from is for hearing", advice="engage run hearing --from FILE.wav"))
     if options.attended:
         end_after_the_parent()
-    on_robot = {*names} <= {*ROBOT}
+    on_robot = {*names} <= {*ROBOT, *SENSES}
     config = options.load() if on_robot else options.read(complete())
     run_until_signal(_serve(options, names, config))
     return DONE

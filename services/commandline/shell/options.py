@@ -205,6 +205,15 @@ class Shown:
             metavar="NAME", help="A further name in the address of the page, as that of a proxy; may be given again."
         ),
     ] = None
+    https: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Speak TLS, with the certificate and the key in this file, which is made if there is none, or in "
+            "the folder of a router's keys: browsers give a microphone to https, and to this machine, only.",
+            show_default=False,
+        ),
+    ] = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -75,7 +75,7 @@ async def _record(options: Options, config: RobotConfig, path: Path) -> int:
     async with await options.open(config.bus, "viewer") as hub:
         bus = hub.join(unique_name("record"), "observer")
         rows = access.rows(bus.role, "subscribes") if config.bus.keys else (keys.EVERYTHING,)
-        patterns = [access.owned(row, bus.name) for row in rows]
+        patterns = [access.owned(row, bus.name) for row in rows if keys.SOUND not in row]
         async with recording(bus, path, patterns, _facts(options), overwrite=options.overwrite) as (
             recorder,
             running,

@@ -12,6 +12,7 @@ A program gets messages as JSON: the newest of them, if it is slow.
 
 from collections import deque
 from collections.abc import Collection
+from typing import Protocol
 
 import msgspec
 from msgspec import Raw, Struct
@@ -20,7 +21,6 @@ from msgspec.json import Encoder
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.web.orders import Panel
-from engage_hri.services.console.web.picture import Picture
 
 NEWS_KEPT = 1000
 """Number of news that wait for a page that draws nothing; it may give no more orders then."""
@@ -135,6 +135,20 @@ class You(Struct, frozen=True):
     inhibits: bool = False
 
 
+class Shown(Protocol):
+    """Source of what a page shows: the picture, or a part of it."""
+
+    @property
+    def versions(self) -> dict[str, int]:
+        """Number of the newest state of each section."""
+
+    def section(self, name: str) -> bytes:
+        """A section as JSON."""
+
+    def zero(self, at: Seconds) -> Seconds:
+        """Seconds of the picture at a local instant."""
+
+
 class Viewer:
     """One browser, which draws a frame before it gets the next: a slow one misses frames, and nothing queues up."""
 
@@ -148,7 +162,7 @@ class Viewer:
 
     def frame(
         self,
-        picture: Picture,
+        picture: Shown,
         now: Seconds,
         you: You | None = None,
         receipts: Receipts | None = None,
@@ -170,14 +184,15 @@ class Viewer:
         if place is not None and (self._place is None or place.visit != self._place.visit):
             self._known = {}
         is_moved, self._place = place != self._place, place
-        new = {name: version for name, version in picture.versions.items() if self._known.get(name) != version}
-        gone = tuple(self._known.keys() - picture.versions.keys())
+        versions = picture.versions
+        new = {name: version for name, version in versions.items() if self._known.get(name) != version}
+        gone = tuple(self._known.keys() - versions.keys())
         beat = now if clock is None else clock
         is_new = new or gone or told or taken is not None or is_moved or you != self._you
         if not is_new and self._told is not None and beat - self._told < HEARTBEAT:
             return None
         self._told = beat
-        self._known = dict(picture.versions)
+        self._known = dict(versions)
         sections = {name: Raw(picture.section(name)) for name in new}
         news, self._you = (you if you != self._you else None), you
         return self._encoder.encode(PageFrame(picture.zero(now), sections, gone, session, taken, news, told, place))

@@ -251,17 +251,20 @@ def server(order: PageOrder) -> str:
     return ""
 
 
-def denied(role: str, trusted: bool, *, keyed: bool = False) -> dict[str, str]:
+def denied(role: str, trusted: bool, *, keyed: bool = False, stage: bool = False) -> dict[str, str]:
     """The rights that a page does not have, each with the reason.
 
-    trusted: the page was called with the token. keyed: the role is that of the window's keys.
+    trusted: the page was called with the token. keyed: the role is that of the window's keys. stage: it is one of
+    the stage, whose visitors sit down and no more.
     """
     if role in RIGHTS and not trusted:
         reason = "this address lacks the token of this window: open the one that `engage console` printed last"
         return dict[str, str].fromkeys(ALL_RIGHTS, reason)
     found: dict[str, str] = {}
     for right in ALL_RIGHTS:
-        if right not in RIGHTS.get(role, ()):
+        if stage and right != "seat":
+            found[right] = "the stage is for visitors; the workshop has this"
+        elif right not in RIGHTS.get(role, ()):
             able = " or ".join(name for name, has in RIGHTS.items() if right in has)
             if keyed:
                 found[right] = f"the window has keys of the role {role}; start it with those of {able}"

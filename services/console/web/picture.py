@@ -322,10 +322,11 @@ class Picture:
         version = self.versions[name]
         known = self._encoded.get(name)
         if known is None or known[0] != version:
-            known = self._encoded[name] = (version, msgspec.json.encode(self._made(name)))
+            known = self._encoded[name] = (version, msgspec.json.encode(self.made(name)))
         return known[1]
 
-    def _made(self, name: str) -> Any:
+    def made(self, name: str) -> Any:
+        """A section; `sections.py` has its fields."""
         if name.startswith(BLOCK):
             return self._blocks.shown(name.removeprefix(BLOCK), self.zero)
         if name.startswith(NET):

@@ -13,6 +13,7 @@ from html import escape
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlencode
 
 import uvicorn
 from starlette.applications import Starlette
@@ -32,6 +33,8 @@ from engage_hri.services.console.web.guard import App, Guarded, Hosts
 from engage_hri.services.console.web.played import PlayedPicture
 from engage_hri.services.console.web.service import WindowServer
 from engage_hri.services.console.web.sessions import CLOSED, PageSession, Sessions
+from engage_hri.services.console.web.sounds import Sounds
+from engage_hri.services.console.web.stage import StageFace
 from engage_hri.services.console.web.visitor import Visitor
 from engage_hri.services.recording.reading import Recording
 
@@ -44,13 +47,17 @@ FULL = 4429
 """Code with which a WebSocket is closed for which there is no room: 4000 and the status that HTTP has for it."""
 WORDS_FULL = f"{MOST_VIEWERS} browsers look on already, and it shows itself to no more"
 PAGE = Path(__file__).parent / "page"
-"""Files of the page."""
+"""Files of the workshop's page."""
+STAGE = Path(__file__).parents[1] / "stage"
+"""Files of the stage's page."""
 THREE = "elements/scene/dist"
 """Where NiceGUI keeps three.js, as one module. No more of NiceGUI is used, and none of its Python is loaded."""
 TOO_MANY = 4408
 """Code with which a WebSocket is closed whose page gives orders and draws no news of them."""
 FRAMES = "/frames"
-"""Path of the WebSocket of our own page."""
+"""Path of the WebSocket of the workshop's page."""
+STAGE_FRAMES = "/stage/frames"
+"""Path of the WebSocket of the stage's page."""
 MESSAGES = "/messages"
 """Path of the WebSocket for programs of others."""
 PAGES = "/pages"
@@ -71,30 +78,28 @@ def application(window: WindowServer, hosts: Hosts, token: str, pages: Path | No
 
     pages: a folder of pages of somebody else, which may listen to the messages. token: who takes part has it in the
     address of the page at the first visit, and then in a cookie, which no script can read: the page's address may be
-    seen, copied, and kept in the history of the browser.
+    seen, copied, and kept in the history of the browser. The stage has another one (`stage_token`), with which
+    one sits down and does no more.
     """
-    cookie = f"engage-{sha256(token.encode()).hexdigest()[:12]}"  # windows at all ports of a host share their cookies
+    visitors = stage_token(token)
+    workshop = Sessions(lambda receipts, trusted: Visitor(window, trusted, receipts), MOST_VIEWERS)
+    face = StageFace(window.picture)
+    stage = Sessions(lambda receipts, trusted: Visitor(window, trusted, receipts, face), MOST_VIEWERS)
 
-    def is_token(given: str) -> bool:
-        return secrets.compare_digest(given.encode(), token.encode())
+    def shows(sessions: Sessions, token: str) -> Callable[[WebSocket], Awaitable[None]]:
+        async def frames(browser: WebSocket) -> None:
+            given = browser.query_params.get("token", browser.cookies.get(_cookie(token), ""))
+            window.viewers += 1
+            try:
+                await _shown(browser, sessions, _is(given, token))
+            finally:
+                window.viewers -= 1
 
-    def enter(request: Request) -> Response | None:
-        if (given := request.query_params.get("token")) is None:
-            return None
-        response = RedirectResponse("./", 303)
-        if is_token(given):
-            response.set_cookie(cookie, token, path=None, httponly=True, samesite="strict")  # path: that of the page
-        return response
+        return frames
 
-    sessions = Sessions(lambda receipts, trusted: Visitor(window, trusted, receipts), MOST_VIEWERS)
-
-    async def frames(browser: WebSocket) -> None:
-        given = browser.query_params.get("token", browser.cookies.get(cookie, ""))
-        window.viewers += 1
-        try:
-            await _shown(browser, sessions, is_token(given))
-        finally:
-            window.viewers -= 1
+    async def close() -> None:
+        await stage.close()
+        await workshop.close()
 
     async def messages(program: WebSocket) -> None:
         only = frozenset(filter(None, program.query_params.get("only", "").split(",")))
@@ -107,10 +112,36 @@ def application(window: WindowServer, hosts: Hosts, token: str, pages: Path | No
             with contextlib.suppress(WebSocketDisconnect):
                 await _tell(window, program, Outbox(only))
 
-    more: list[BaseRoute] = [WebSocketRoute(MESSAGES, messages)]
+    def visitor(session: str) -> Visitor | None:
+        guest = workshop.guest(session) or stage.guest(session)
+        return guest if isinstance(guest, Visitor) else None
+
+    sounds = Sounds(window.bus, visitor)
+    more: list[BaseRoute] = [
+        WebSocketRoute(MESSAGES, messages),
+        WebSocketRoute("/voice", sounds.voice),
+        WebSocketRoute("/microphone", sounds.microphone),
+        Route("/stage", _page(STAGE, window.bus.robot, visitors)),
+        WebSocketRoute(STAGE_FRAMES, shows(stage, visitors)),
+        Mount("/stage", _Fresh(directory=STAGE)),
+    ]
     if pages is not None:
         more.append(Mount(PAGES, StaticFiles(directory=pages, html=True)))
-    return Guarded(_app(window.bus.robot, frames, sessions.close, more, enter), hosts, {MESSAGES})
+    return Guarded(_app(window.bus.robot, shows(workshop, token), close, more, token), hosts, {MESSAGES})
+
+
+def stage_token(token: str) -> str:
+    """The token of visitors of the stage, who may sit down. From it nobody learns the window's own."""
+    return sha256(f"stage {token}".encode()).hexdigest()[:16]
+
+
+def _cookie(token: str) -> str:
+    """Name of the cookie that holds a token: windows at all ports of a host share their cookies."""
+    return f"engage-{sha256(token.encode()).hexdigest()[:12]}"
+
+
+def _is(given: str, token: str) -> bool:
+    return secrets.compare_digest(given.encode(), token.encode())
 
 
 def recorded(recording: Recording, hosts: Hosts) -> App:
@@ -123,10 +154,10 @@ def recorded(recording: Recording, hosts: Hosts) -> App:
     return Guarded(_app(recording.robot, frames, sessions.close), hosts)
 
 
-def page_of(robot: str) -> str:
-    """The page of a robot, which knows the kinds of connection events."""
+def page_of(robot: str, folder: Path = PAGE) -> str:
+    """The page of a robot, which knows the kinds of connection events. folder: its files."""
     kinds = [(kind, each.short or each.title, each.is_answered) for kind, each in EVENT_KINDS.items()]
-    page = (PAGE / "index.html").read_text(encoding="utf-8").replace("{kinds}", escape(json.dumps(kinds)))
+    page = (folder / "index.html").read_text(encoding="utf-8").replace("{kinds}", escape(json.dumps(kinds)))
     return page.replace("{robot}", escape(robot))
 
 
@@ -135,17 +166,9 @@ def _app(
     frames: Callable[[WebSocket], Awaitable[None]],
     close: Callable[[], Awaitable[None]],
     more: Iterable[BaseRoute] = (),
-    enter: Callable[[Request], Response | None] = lambda request: None,
+    token: str = "",
 ) -> Starlette:
-    """The page and its frames. close: is called at the end. enter: may answer in place of the page."""
-    page = page_of(robot)
-    imports = re.search("<script type=.importmap.>(.*?)</script>", page)
-    assert imports is not None
-    digest = b64encode(sha256(imports[1].encode()).digest()).decode()
-    headers = {"content-security-policy": POLICY.format(imports=digest)}
-
-    async def index(request: Request) -> Response:
-        return enter(request) or HTMLResponse(page, headers=headers)
+    """The workshop and its frames. close: is called at the end."""
 
     @contextlib.asynccontextmanager
     async def life(app: Starlette) -> AsyncIterator[None]:
@@ -156,13 +179,40 @@ def _app(
 
     (nicegui,) = find_spec("nicegui").submodule_search_locations  # type: ignore[union-attr,misc]
     routes = [
-        Route("/", index),
+        Route("/", _page(PAGE, robot, token)),
         Mount("/page", _Fresh(directory=PAGE)),
         Mount("/three", StaticFiles(directory=Path(nicegui) / THREE)),
         WebSocketRoute(FRAMES, frames),
         *more,
     ]
     return Starlette(routes=routes, lifespan=life)
+
+
+def _page(folder: Path, robot: str, token: str) -> Callable[[Request], Awaitable[Response]]:
+    """Answer with the `index.html` of a folder, and take the token out of its address at the first visit.
+
+    token: empty: there is none.
+    """
+    page = page_of(robot, folder)
+    imports = re.search("<script type=.importmap.>(.*?)</script>", page)
+    assert imports is not None
+    digest = b64encode(sha256(imports[1].encode()).digest()).decode()
+    headers = {"content-security-policy": POLICY.format(imports=digest)}
+
+    async def answer(request: Request) -> Response:
+        asked = dict(request.query_params)
+        given = asked.pop("token", None)
+        if given is None or not token:
+            return HTMLResponse(page, headers=headers)
+        rest = f"?{urlencode(asked)}" if asked else ""
+        response = RedirectResponse(f"./{request.url.path.rpartition('/')[2]}{rest}", 303)
+        if _is(given, token):
+            safe = request.url.scheme == "https"
+            # path: that of the page
+            response.set_cookie(_cookie(token), token, path=None, httponly=True, samesite="strict", secure=safe)
+        return response
+
+    return answer
 
 
 class _Fresh(StaticFiles):
@@ -319,15 +369,17 @@ class _Quiet(uvicorn.Server):
 
 
 @contextlib.asynccontextmanager
-async def serving(app: App, host: str, port: int) -> AsyncIterator[int]:
+async def serving(app: App, host: str, port: int, keys: tuple[Path, Path] | None = None) -> AsyncIterator[int]:
     """Serve while the body of `async with` runs. port: 0: any that is free. Returns the port.
 
-    Raises OSError if the port is taken.
+    keys: files of a certificate and of its private key, to speak TLS. Raises OSError if the port is taken.
     """
+    certificate, private = keys or (None, None)
     # With a configuration of its own for the log, it would close the handlers of ours.
     config = uvicorn.Config(
         app, log_config=None, log_level="warning", access_log=False, lifespan="on", timeout_graceful_shutdown=1,
         ws="websockets-sansio", ws_per_message_deflate=False, ws_max_size=LARGEST_ORDER,
+        ssl_certfile=certificate, ssl_keyfile=private,
     )  # fmt: skip
     listening = _bound(host, port)
     server = _Quiet(config)

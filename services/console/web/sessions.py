@@ -77,6 +77,11 @@ class Sessions:
         session.links += 1
         return session
 
+    def guest(self, id: str) -> Guest | None:
+        """The guest of a session; None: there is no such session."""
+        session = self._known.get(id)
+        return session.guest if session is not None else None
+
     async def part(self, session: PageSession, link: int, code: int) -> None:
         """Take note that a link has ended. link: its number. code: of RFC 6455, with which it did."""
         if session.links != link or session.receipts.session not in self._known:

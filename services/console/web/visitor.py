@@ -24,6 +24,7 @@ from engage_hri.services.console.web.orders import Panel
 from engage_hri.services.console.web.scene import laid
 from engage_hri.services.console.web.seats import SETTLED, Invitation
 from engage_hri.services.console.web.service import WindowServer
+from engage_hri.services.console.web.stage import StageFace
 from engage_hri.services.text.pieces import Ids
 
 REACH: Seconds = 0.9
@@ -33,12 +34,18 @@ PATIENCE: Seconds = 5.0
 
 
 class Visitor:
-    """The one at a browser. trusted: the page was called with the token of the window."""
+    """The one at a browser. trusted: the page was called with the token of the window.
 
-    def __init__(self, window: WindowServer, trusted: bool, receipts: Receipts) -> None:
+    stage: what the stage shows, for a page of it, from which nobody does more than sit down; None: of the workshop.
+    """
+
+    def __init__(
+        self, window: WindowServer, trusted: bool, receipts: Receipts, stage: StageFace | None = None
+    ) -> None:
         self._window = window
         self.receipts = receipts
-        self._denied = orders.denied(window.bus.role, trusted, keyed=window.keyed)
+        self._stage = stage
+        self._denied = orders.denied(window.bus.role, trusted, keyed=window.keyed, stage=stage is not None)
         self._tasks: set[asyncio.Task[None]] = set()
         self._person: PerceivedPerson | None = None
         self._sitting: asyncio.Task[None] | None = None
@@ -48,11 +55,18 @@ class Visitor:
         self._acting: asyncio.Task[None] | None = None
 
     @property
+    def person(self) -> str:
+        """Id of the person that they are; empty: none."""
+        return self._person.id if self._person else ""
+
+    @property
     def you(self) -> You:
+        if self._stage is not None:
+            return You(person=self._person.id if self._person else "", denied=self._denied)
         body = self._window.picture.body
         invited = Invitation("", "") if self._person else self._window.invitation
         return You(
-            person=self._person.id if self._person else "",
+            person=self.person,
             there=invited.there,
             sit=invited.button,
             denied=self._denied,
@@ -65,7 +79,7 @@ class Visitor:
         """The next frame for this viewer."""
         picture, now = self._window.picture, self._window.bus.now()
         picture.advance(now)
-        return viewer.frame(picture, now, self.you, self.receipts)
+        return viewer.frame(self._stage or picture, now, self.you, self.receipts)
 
     def take(self, given: orders.Given) -> None:
         """Carry out an order, or begin to; what fails is told."""

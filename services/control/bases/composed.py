@@ -145,6 +145,8 @@ class ComposedBody(Body):
             member.body.on_fault = self._tell_fault
             member.body.on_recovery = lambda text: self.on_recovery(text)
             member.body.on_lips = self.move_lips
+            member.body.on_sound = lambda sound: self.on_sound(sound)
+            member.body.wants_sound = lambda: self.wants_sound()
             member.body.others_say = self._saying
 
     def _tell_fault(self, fault: Fault) -> None:

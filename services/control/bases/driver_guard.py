@@ -70,6 +70,8 @@ class GuardedBody(Body):
         body.on_fault = lambda fault: self.on_fault(fault)
         body.on_recovery = lambda text: self.on_recovery(text)
         body.on_lips = lambda shapes: self.on_lips(shapes)
+        body.on_sound = lambda sound: self.on_sound(sound)
+        body.wants_sound = lambda: self.wants_sound()
         body.others_say = lambda: self.others_say()
 
     @asynccontextmanager

@@ -264,6 +264,18 @@ class MouthShape(Struct, frozen=True):
     width: float = 0.0
 
 
+class SpokenSound(Struct, frozen=True):
+    """A piece of what a voice says: 16 bit, little-endian, one channel.
+
+    at: loop time at which the first sample is heard, seconds. rate: samples per second. samples: empty: nothing of
+    what was told before is heard from `at` on.
+    """
+
+    at: Seconds
+    rate: int
+    samples: bytes = b""
+
+
 class Seen(Struct, frozen=True, kw_only=True):
     """Rays as in `BodyState`, as people and cameras see them."""
 
@@ -298,6 +310,8 @@ class Body(ABC):
     others_say: tells what the voices of other drivers say now; empty: nothing. Who composes the body replaces it.
     on_lips: called by a voice with all the mouth shapes of what it begins to say, in time order, and with none when
     it falls silent early. Whoever runs the body replaces it.
+    on_sound: called by a voice with what it is about to be heard of, in time order, wherever else its sound goes.
+    wants_sound: tells whether anybody plays what `on_sound` is told. Whoever runs the body replaces both.
     """
 
     Settings: ClassVar[type[Struct] | None] = None
@@ -307,6 +321,8 @@ class Body(ABC):
     on_fault: Callable[[Fault], None] = staticmethod(lambda fault: None)
     on_recovery: Callable[[str], None] = staticmethod(lambda text: None)
     on_lips: Callable[[Sequence[MouthShape]], None] = staticmethod(lambda shapes: None)
+    on_sound: Callable[[SpokenSound], None] = staticmethod(lambda sound: None)
+    wants_sound: Callable[[], bool] = staticmethod(lambda: False)
 
     @classmethod
     def configured(cls, config: ControlConfig, settings: Any) -> Self:

@@ -7,6 +7,7 @@ from typing import BinaryIO
 
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.control.contract.body import SpokenSound
 
 STUCK: Seconds = 0.8
 """So long an outlet may take nothing while it is late, before it counts as dead."""
@@ -64,8 +65,11 @@ class Outlet:
         tail: the last samples before it as they should have been, for an outlet that can still change them.
         """
 
+    def announce_cut(self, at: Seconds) -> None:
+        """Take note that `cut` is to come at a time, unless a device is late until then."""
+
     def revive(self) -> None:
-        """Try again after a fault."""
+        """Get ready for a speech: try again after a fault."""
 
     def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
         """Call `on_fault` when there is one, until the returned function is called."""
@@ -146,11 +150,70 @@ class Several(Outlet):
         for each in () if self._is_mute else self.outlets:
             each.cut(at, tail)
 
+    def announce_cut(self, at: Seconds) -> None:
+        for each in () if self._is_mute else self.outlets:
+            each.announce_cut(at)
+
     def watch(self, on_fault: Callable[[], None]) -> Callable[[], None]:
         ends = ExitStack()
         for watch in (super().watch, *(each.watch for each in self.outlets)):
             ends.callback(watch(on_fault))
         return ends.close
+
+
+AHEAD: Seconds = 0.15
+"""How long before it is heard sound is told that others play: for its way to them, and a loop that is late."""
+SOON: Seconds = 0.06
+"""The same where a speech begins or goes on: gestures that begin with it do not wait for it."""
+PIECE: Seconds = 0.1
+"""Seconds of sound in what is told at a time."""
+
+
+class ToldSound(Outlet):
+    """An outlet to whoever plays the voice elsewhere, as the pages of a window do. It knows nothing of their devices.
+
+    Whether anybody plays it is asked as a speech begins: whoever comes later hears its first words a little late.
+    """
+
+    def __init__(
+        self,
+        now: Callable[[], Seconds],
+        rate: int,
+        tell: Callable[[SpokenSound], None],
+        is_wanted: Callable[[], bool],
+    ) -> None:
+        """rate: samples per second. tell: gets the sound, and where it is cut. is_wanted: whether anybody plays."""
+        super().__init__(now)
+        self._rate, self._tell, self._is_wanted = rate, tell, is_wanted
+        self._lead: Seconds = 0.0
+        self._silent_from: Seconds = 0.0
+        """Where what was told is cut, or else ends."""
+
+    @property
+    def lead(self) -> Seconds:
+        return self._lead
+
+    def earliest(self) -> Seconds:
+        return self.now() + min(SOON, self._lead)
+
+    def revive(self) -> None:
+        self._lead = AHEAD if self._is_wanted() else 0.0
+
+    def play(self, samples: bytes, at: Seconds) -> None:
+        if not self._is_wanted():
+            return
+        size = 2 * round(PIECE * self._rate)
+        for begin in range(0, len(samples), size):
+            self._tell(SpokenSound(at + begin / 2 / self._rate, self._rate, samples[begin : begin + size]))
+        self._silent_from = max(self._silent_from, at + len(samples) / 2 / self._rate)
+
+    def announce_cut(self, at: Seconds) -> None:
+        if at < self._silent_from:
+            self._silent_from = at
+            self._tell(SpokenSound(at, self._rate))
+
+    def cut(self, at: Seconds, tail: bytes) -> None:
+        self.announce_cut(at)
 
 
 COMMENT_SIZE = 80

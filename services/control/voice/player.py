@@ -157,7 +157,8 @@ DYING = 50
 """Steps for which it is waited until a player is dead that was killed: a second."""
 _STEP: Seconds = 0.02
 WITHOUT = "`--set control.drivers.espeak.device=none` goes on without sound (espeak, or the name of your own voice)"
-ADVICE = f"install one of them (Debian: alsa-utils, pulseaudio-utils, pipewire-bin or sox); {WITHOUT}"
+INSTALL = "Debian: alsa-utils, pulseaudio-utils, pipewire-bin or sox"
+ADVICE = f"install one of them ({INSTALL}); {WITHOUT}"
 
 
 class PlayerProgram(NamedTuple):
@@ -362,7 +363,10 @@ class Player(Outlet):
 
 
 def found(settings: VoiceSettings) -> PlayerProgram | None:
-    """Find the player that the settings ask for; None: no device. Raises InputRefused."""
+    """Find the player that the settings ask for; None: no device. Raises InputRefused.
+
+    Without any program here that plays sound, `auto` is no device: the pages of a window play it all the same.
+    """
     if settings.device == "none":
         return None
     if settings.player:
@@ -375,9 +379,11 @@ def found(settings: VoiceSettings) -> PlayerProgram | None:
     if program is None and here:
         reason = f"{here[0].command[0]} takes no raw sound from a pipe here: it has no option --raw, it is too old"
         raise InputRefused(_refusal(reason, ADVICE))
-    if program is None:
+    if program is None and settings.device != "auto":
         raise InputRefused(_refusal(f"no program here plays sound: tried {', '.join(names)}", ADVICE))
-    return program if settings.latency is None else program._replace(latency=settings.latency)
+    if program is None or settings.latency is None:
+        return program
+    return program._replace(latency=settings.latency)
 
 
 def _takes_raw(program: PlayerProgram) -> bool:

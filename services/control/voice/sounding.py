@@ -5,6 +5,7 @@ class MyVoice(SoundingVoice):
 """
 
 import asyncio
+import logging
 import time
 from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
@@ -26,7 +27,7 @@ from engage_hri.services.control.contract.body import (
 )
 from engage_hri.services.control.voice import player
 from engage_hri.services.control.voice.espeak import EspeakSettings, EspeakSynthesizer
-from engage_hri.services.control.voice.outlets import Outlet, Several, WavFile
+from engage_hri.services.control.voice.outlets import Outlet, Several, ToldSound, WavFile
 from engage_hri.services.control.voice.speaker import Speaker
 from engage_hri.services.control.voice.speaking import Part, expected, joined, silent, sounding, utter_parts
 from engage_hri.services.control.voice.studio import MAKING, Studio
@@ -81,6 +82,9 @@ class SoundingVoice(Speaker):
                 raise InputRefused(error.fault) from error
             outlets: list[Outlet] = []
             program = player.found(self._settings) if self._is_real else None
+            if self._is_real and program is None and self._settings.device != "none":
+                reason = "no program here plays sound, so the voice is heard in the pages of a window alone"
+                logging.getLogger("engage").warning("control: %s (%s)", reason, player.INSTALL)
             if program is not None:
                 self._player = player.Player(program, self._studio.rate)
                 await stack.enter_async_context(self._player.connected())
@@ -90,7 +94,12 @@ class SoundingVoice(Speaker):
             for each in outlets:
                 stack.callback(each.watch(partial(self._tell_fault, each)))
                 self._tell_fault(each)
-            self._outlet.outlets = outlets or self._outlet.outlets
+            outlets.append(
+                ToldSound(
+                    self._loop.time, self._studio.rate, lambda told: self.on_sound(told), lambda: self.wants_sound()
+                )
+            )
+            self._outlet.outlets = outlets
             yield
 
     def _file(self) -> WavFile:

@@ -425,6 +425,7 @@ class _Utterance:
         cut = Item(until, Cut(faded(self._before(until))))
         place = sum(word.at < until for word in kept)
         self._coming = deque([*kept[:place], cut, *kept[place:]])
+        self._outlet.announce_cut(self._begin + until)
         self._tail = None
 
     def _before(self, until: Seconds) -> bytes:

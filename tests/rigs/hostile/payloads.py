@@ -44,6 +44,7 @@ from engage_hri.schemas.perception import (
 )
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, OpenEvents, Statistics, TurnOutcome
 from engage_hri.schemas.requests import Cancel, KeepAlive, Request
+from engage_hri.schemas.sound import SoundFrame
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from tests.rigs.hostile.chance import Chance, happens
@@ -152,6 +153,8 @@ class Payloads:
                 return keys.head_pose(_chunk(actor))
             case VoiceActivity(actor=actor):
                 return keys.voice_activity(_chunk(actor))
+            case SoundFrame():
+                return self._chance.choice((keys.ROBOT_SOUND, keys.sound("stranger")))
             case ConnectionEvent(kind=kind):
                 return keys.connection_event("person", kind)
             case OpenEvents(actor=actor):

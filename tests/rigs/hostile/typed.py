@@ -107,8 +107,10 @@ class RandomMessages:
                 if least is not None and most is not None:
                     return self._chance.uniform(least, most)
                 return self._now + self._chance.uniform(-2.0, 2.0) if field == "seconds" else self._moderate()
-            case shapes.IntType():
-                return self._chance.choice(NASTY_INTS) if nasty else self._chance.randrange(0, 4)
+            case shapes.IntType(ge=least):
+                return self._chance.choice(NASTY_INTS) if nasty else (least or 0) + self._chance.randrange(0, 4)
+            case shapes.BytesType():  # sound: two bytes for each sample
+                return b"\x01\x80" * self._chance.randrange(0, 20000 if nasty else 4)
             case shapes.BoolType():
                 return happens(self._chance, 0.5)
             case shapes.NoneType():

@@ -44,7 +44,7 @@ async def visited(hub: MemoryHub) -> AsyncIterator[tuple[SeenAndHeard, asyncio.E
     """A table with nobody before it, and whether its task is over."""
     heard = SeenAndHeard()
     config = load(settings=("simulation.human=none",), defaults=FOR_YOU)
-    async with following(hub.join("console"), (heard.take,)), running(hub, services(config, *roster.NAMES)) as over:
+    async with following(hub.join("console"), (heard.take,)), running(hub, services(config, *roster.PLAY)) as over:
         yield heard, over
 
 

@@ -10,7 +10,8 @@ const KEPT = `engage-orders ${location.pathname}`; // what is left over as the p
 const clock = () => Date.now() / 1000; // goes on while a computer sleeps
 
 // take: gets each frame, and whether it is the first of a link. tell: whether the window is there, and why not. report: what was not done. wait: names of orders without an answer.
-export function follow({ take, tell, report, wait }) {
+// place: address of the frames.
+export function follow({ place: frames = "frames", take, tell, report, wait }) {
   let socket = null;
   let ended = false;
   let silent = 0; // looks since the last frame: time in which this page does not run, as that of a computer that sleeps, does not count
@@ -28,7 +29,7 @@ export function follow({ take, tell, report, wait }) {
   }
 
   function open() {
-    const place = new URL("frames", document.baseURI);
+    const place = new URL(frames, document.baseURI);
     place.protocol = place.protocol.replace("http", "ws");
     place.searchParams.set("session", orders.session);
     const own = new WebSocket(place);
@@ -80,6 +81,9 @@ export function follow({ take, tell, report, wait }) {
   });
   open();
   return {
+    get session() {
+      return orders.session;
+    },
     send(order) {
       say(orders.give(order, clock()));
       flush();

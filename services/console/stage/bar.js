@@ -1,0 +1,155 @@
+// The bars: above the language, below the one large button, and what a person at the table can do.
+import { element } from "../page/look.js";
+import { put } from "./heads.js";
+
+const icon = (path) => `<svg viewBox="0 0 24 24" width="26" height="26" fill="none" stroke="currentColor" stroke-width="2" stroke-linecap="round" stroke-linejoin="round" aria-hidden="true">${path}</svg>`;
+const ICONS = {
+  mic: icon('<rect x="9" y="3" width="6" height="11" rx="3"/><path d="M5 11a7 7 0 0 0 14 0M12 18v3"/>'),
+  send: icon('<path d="M4 12 20 4l-4 16-4-7z"/>'),
+  nod: icon('<circle cx="12" cy="12" r="8"/><path d="M12 8v7m-3-3 3 3 3-3"/>'),
+  point: icon('<path d="M9 12V5a1.5 1.5 0 0 1 3 0v5l4 1a3 3 0 0 1 2 3l-.5 3a4 4 0 0 1-4 3H12a4 4 0 0 1-3.2-1.6L5.5 14A1.6 1.6 0 0 1 8 12z"/>'),
+  leave: icon('<path d="M14 4h4a2 2 0 0 1 2 2v12a2 2 0 0 1-2 2h-4M3 12h11m-4-4 4 4-4 4"/>'),
+};
+
+// order: sends one. turn: takes the other language.
+export function bar({ top, bottom, order, turn }) {
+  let text = null;
+  let isSitting = false;
+  let isSpeaking = false;
+  const drawing = (name) => {
+    const made = element("span", { class: "icon" });
+    made.innerHTML = ICONS[name];
+    return made;
+  };
+  const button = (kind, act, ...inside) => {
+    const made = element("button", { type: "button", class: kind }, ...inside);
+    if (act) made.addEventListener("click", act);
+    return made;
+  };
+  const other = button("other", turn);
+  const who = element("p", { class: "who" }, element("i", { class: "ring" }), element("b", {}), element("span", { class: "level" }));
+  top.append(who, other);
+
+  const hint = element("p", { class: "hint", role: "status" });
+  const sit = button("sit", () => {
+    if (isSitting || sit.getAttribute("aria-disabled")) return;
+    isSitting = true;
+    draw();
+    order({ do: "sit", name: "" });
+  });
+  const welcome = element("div", { class: "welcome" }, element("p", { class: "hello" }), element("p", { class: "what" }));
+  const away = element("div", { class: "away" }, sit);
+  top.after(welcome);
+
+  const hold = button("hold", null, drawing("mic"));
+  const speak = (on) => {
+    if (isSpeaking === on) return;
+    isSpeaking = on;
+    hold.setAttribute("aria-pressed", String(on));
+    order({ do: "speak", on });
+    draw();
+  };
+  hold.addEventListener("pointerdown", (event) => {
+    hold.setPointerCapture(event.pointerId);
+    speak(true);
+  });
+  for (const end of ["pointerup", "pointercancel", "blur"]) hold.addEventListener(end, () => speak(false));
+  hold.addEventListener("keydown", (event) => {
+    if (event.key !== " " && event.key !== "Enter") return;
+    event.preventDefault();
+    if (!event.repeat) speak(true);
+  });
+  hold.addEventListener("keyup", () => speak(false));
+  hold.addEventListener("contextmenu", (event) => event.preventDefault());
+  const words = element("input", { type: "text", maxlength: "400", autocomplete: "off", enterkeyhint: "send" });
+  const send = element("button", { type: "submit", class: "send" }, drawing("send"));
+  const form = element("form", { class: "say" }, hold, words, send);
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    if (words.value.trim()) order({ do: "type", text: words.value.trim() });
+    words.value = "";
+  });
+  const quick = [0, 1, 2].map((index) => button("quick", () => {
+    const [, said, how] = text.quick[index];
+    if (how) order({ do: "head", how });
+    order({ do: "type", text: said });
+  }));
+  const named = (kind, name, act) => button(kind, act, drawing(name), element("span", {}));
+  const nod = named("do", "nod", () => order({ do: "head", how: "nod" }));
+  const point = named("do", "point", () => {
+    point.setAttribute("aria-pressed", String(point.getAttribute("aria-pressed") !== "true"));
+    draw();
+  });
+  point.setAttribute("aria-pressed", "false");
+  const leave = named("do", "leave", () => order({ do: "leave" }));
+  const here = element("div", { class: "here" }, form, element("div", { class: "quickly" }, ...quick, nod, point, leave));
+  bottom.append(hint, away, here);
+
+  let last = null;
+  function draw() {
+    if (!last || !text) return;
+    const { person, denied, ready, company } = last;
+    const isFree = ready && !denied;
+    here.hidden = !person;
+    away.hidden = welcome.hidden = Boolean(person);
+    sit.hidden = Boolean(denied);
+    isFree ? sit.removeAttribute("aria-disabled") : sit.setAttribute("aria-disabled", "true"); // it keeps the focus
+    sit.textContent = isSitting ? text.sitting : company.length ? text.beside(company.join(text.and)) : text.sit;
+    welcome.classList.toggle("company", company.length > 0);
+    welcome.firstChild.textContent = text.hello;
+    welcome.lastChild.textContent = denied ? text.onlooker : company.length ? `${text.others(company.join(text.and))} ${text.welcome}` : text.welcome;
+    hold.classList.toggle("on", isSpeaking);
+  }
+  return {
+    // language: its texts.
+    speak(language) {
+      text = language;
+      other.textContent = text.other;
+      other.setAttribute("aria-label", text.language);
+      words.placeholder = text.type;
+      words.setAttribute("aria-label", text.type);
+      send.setAttribute("aria-label", text.send);
+      hold.setAttribute("aria-label", text.hold);
+      quick.forEach((each, index) => (each.textContent = text.quick[index][0]));
+      for (const [made, name] of [[nod, "nod"], [point, "point"], [leave, "leave"]]) made.lastChild.textContent = text[name];
+      draw();
+    },
+    // person: id of who looks; empty: no seat. ready: the robot can be talked with. company: names of others.
+    take(state) {
+      const was = last?.person;
+      last = state;
+      if (state.person) isSitting = false;
+      if (was && !state.person) {
+        isSpeaking = false;
+        hold.setAttribute("aria-pressed", "false");
+        point.setAttribute("aria-pressed", "false");
+      }
+      const hadFocus = (state.person ? away : here).contains(document.activeElement);
+      draw();
+      if (hadFocus) (state.person ? words : sit).focus({ preventScroll: true });
+      who.hidden = !state.person;
+      who.children[1].textContent = text?.you ?? "";
+      put(who, state.measure, state.speaks);
+      who.lastChild.textContent = text?.mine[state.measure?.level ?? "unknown"] ?? "";
+    },
+    // Say one line; urgent: it stays before others for a while.
+    hint(line) {
+      if (hint.textContent !== line) hint.textContent = line;
+      hint.classList.toggle("empty", !line);
+    },
+    // Something was not done.
+    rise() {
+      isSitting = false;
+      draw();
+    },
+    get points() {
+      return point.getAttribute("aria-pressed") === "true";
+    },
+    pointed() {
+      point.setAttribute("aria-pressed", "false");
+    },
+    get isSpeaking() {
+      return isSpeaking;
+    },
+  };
+}

@@ -1,0 +1,193 @@
+// The stage: what a visitor sees of the robot, and how they sit down and talk with it.
+import { follow } from "../page/link.js";
+import { bar as bars } from "./bar.js";
+import { heads as atHeads } from "./heads.js";
+import { scene as space } from "./scene.js";
+import { touch as hands } from "./touch.js";
+import { moment, visit } from "./visit.js";
+import { another, language, texts } from "./words.js";
+
+const TOLD = 4; // seconds for which news of an order are shown
+const at = (what) => document.querySelector(what);
+const asked = new URLSearchParams(location.search);
+const isKiosk = asked.has("kiosk");
+const state = { robot: document.body.dataset.robot, person: "", scene: null, talk: null, text: null, denied: "", link: "" };
+const clock = () => performance.now() / 1000;
+
+let spoken = asked.get("lang") ?? (isKiosk ? null : localStorage.getItem("engage-language"));
+spoken = language([spoken, ...navigator.languages].filter(Boolean));
+let idle = clock(); // when somebody did something last
+let touched = false;
+let news = { text: "", until: 0 };
+
+const order = (what) => link.send(what);
+const bar = bars({
+  top: at(".top"), bottom: at(".bar"), order,
+  turn() {
+    spoken = another(spoken);
+    if (!isKiosk) localStorage.setItem("engage-language", spoken);
+    speak();
+  },
+});
+const box = { top: 0, bottom: 0, width: 0 };
+function measure() {
+  box.width = innerWidth;
+  box.top = at(".top").getBoundingClientRect().bottom + 4;
+  box.bottom = at(".bar").getBoundingClientRect().top;
+}
+new ResizeObserver(measure).observe(at(".bar"));
+addEventListener("resize", measure);
+
+let shown = null;
+try {
+  const insets = () => ({ top: box.top + (innerWidth > 1.2 * innerHeight ? 8 : Math.min(150, innerHeight * (state.person ? 0.15 : 0.12))), bottom: innerHeight - box.bottom + 14, side: Math.max(10, innerWidth * 0.03) });
+  shown = space(at(".scene"), insets);
+} catch (error) {
+  console.warn(error);
+  at(".stage").classList.add("flat");
+}
+const touch = shown && hands({ place: at(".scene"), list: at(".pieces"), scene: shown, state, order, bar });
+const heads = atHeads(at(".heads"));
+
+function speak() {
+  state.text = texts(spoken);
+  document.documentElement.lang = spoken;
+  document.title = state.text.title;
+  at("h1").textContent = state.text.title;
+  at(".scene").setAttribute("aria-label", state.text.scene);
+  at(".pieces").setAttribute("aria-label", state.text.pieces);
+  at(".read").setAttribute("aria-label", state.text.log);
+  bar.speak(state.text);
+  tell();
+}
+
+function tell() {
+  const { talk, scene, person } = state;
+  const present = scene?.people.filter((each) => each.at && each.present && each.id !== person) ?? [];
+  bar.take({
+    person, denied: state.denied, ready: talk?.state === "ready" && !state.link && Boolean(scene?.body), company: present.map(({ id }) => id),
+    measure: talk?.levels.find(({ actor }) => actor === person), speaks: bar.isSpeaking,
+  });
+  document.body.classList.toggle("seated", Boolean(person));
+  if (shown && scene) shown.take(scene, person);
+}
+
+// A screen reader hears each turn once, when it is over.
+const read = new Set();
+function readOut() {
+  for (const turn of state.talk.bubbles) {
+    const key = `${turn.actor} ${turn.since}`;
+    if (turn.open || read.has(key)) continue;
+    read.add(key);
+    const line = document.createElement("p");
+    line.lang = "en";
+    line.textContent = `${turn.actor === state.person ? state.text.you : turn.actor === state.robot ? state.text.robot : turn.actor}: ${turn.words}`;
+    at(".read").append(line);
+    while (at(".read").children.length > 12) at(".read").firstChild.remove();
+  }
+}
+
+let offset = null; // from our clock to seconds of the picture
+const link = follow({
+  place: "stage/frames",
+  take(frame, isFirst) {
+    const behind = clock() - frame.now;
+    offset = offset === null || isFirst || behind < offset ? behind : offset + (behind - offset) * 0.002; // frames come late, never early
+    if (frame.sections?.scene) state.scene = frame.sections.scene;
+    if (frame.sections?.talk) state.talk = frame.sections.talk;
+    if (frame.you) {
+      if (state.person && !frame.you.person && isFirst) note(state.text.gone);
+      state.person = frame.you.person ?? "";
+      state.denied = frame.you.denied?.seat ?? "";
+    }
+    if (frame.told?.length) refuse(frame.told);
+    if (frame.sections?.talk) readOut();
+    if (frame.sections || frame.you) tell();
+    document.body.dataset.frames = Number(document.body.dataset.frames ?? 0) + 1;
+  },
+  tell(isThere, reason = "") {
+    const now = isThere ? "" : reason ? "full" : "lost";
+    if (state.link === now) return;
+    state.link = now;
+    tell();
+  },
+  report: refuse,
+  wait() {},
+});
+
+function note(text) {
+  news = { text, until: clock() + TOLD };
+}
+function refuse(told) {
+  bar.rise();
+  note(told.some(({ text }) => text.includes("on its way")) ? state.text.busy : state.text.refused);
+}
+
+// Somebody is there: what they do counts, whatever it is.
+for (const kind of ["pointerdown", "pointermove", "keydown", "wheel", "touchstart"]) {
+  addEventListener(kind, () => {
+    idle = clock();
+    touched = true;
+  }, { capture: true, passive: true });
+}
+
+const ask = at(".ask");
+function asks(left) {
+  if (left === null) {
+    if (ask.open) ask.close();
+    return;
+  }
+  if (!ask.open) {
+    const stay = document.createElement("button");
+    ask.replaceChildren(document.createElement("h2"), document.createElement("p"), stay);
+    ask.querySelector("h2").textContent = state.text.still;
+    stay.textContent = state.text.stay;
+    stay.addEventListener("click", () => ask.close());
+    ask.showModal();
+  }
+  ask.querySelector("p").textContent = state.text.ending(left);
+}
+
+function hint(now) {
+  const { text, talk, person } = state;
+  if (state.link) return text[state.link];
+  if (!talk || talk.state !== "ready") return text[talk?.state ?? "away"];
+  if (now < news.until) return news.text;
+  if (!person) return "";
+  if (bar.isSpeaking) return text.talks;
+  if (bar.points) return text.pointing;
+  const thing = (id) => state.scene.things.find((each) => each.id === id)?.label ?? id;
+  const met = moment(talk, state.scene.robot, person);
+  const next = visit(now - idle, { seated: true, kiosk: isKiosk, touched });
+  if (next.do === "tip" && met?.text !== "looking") return text.tips[next.number % text.tips.length];
+  if (met) return typeof text[met.text] === "function" ? text[met.text](thing(met.about)) : text[met.text];
+  return text.tips[0];
+}
+
+const dark = matchMedia("(prefers-color-scheme: dark)");
+let last = 0;
+function tick() {
+  requestAnimationFrame(tick);
+  const now = clock();
+  if (bar.isSpeaking) idle = now;
+  const next = visit(now - idle, { seated: Boolean(state.person), kiosk: isKiosk, touched });
+  if (next.do === "anew") {
+    touched = false;
+    location.replace(`${location.pathname}?kiosk`);
+    return;
+  }
+  asks(next.do === "ask" ? next.left : null);
+  if (!state.scene || !state.talk) return bar.hint(state.text ? hint(now) : "");
+  const drawn = shown?.draw(now, state.talk.bonds, dark.matches);
+  if (!drawn && now - last < 0.1) return;
+  last = now;
+  bar.hint(hint(now));
+  touch?.draw();
+  const where = shown ? (place) => shown.onPage(place) : () => ({ x: box.width / 2, y: box.top });
+  heads.draw({ talk: state.talk, scene: state.scene, you: state.person, text: state.text, now: now - offset, at: now, where, box });
+}
+
+speak();
+measure();
+requestAnimationFrame(tick);
+window.stage = { state, send: order, shown, box }; // for who looks into the page with the browser's tools

@@ -1,0 +1,28 @@
+// What becomes of somebody who does nothing, by the seconds since they last did something. Pure.
+export const TIP = 12; // seconds until a tip, and between two
+export const ASK = 45; // seconds until a kiosk asks whether somebody is still there
+export const LEAVE = 60; // seconds until it begins anew
+
+// seated: they have a seat. Returns what to do: nothing, `tip` with its number, `ask` with the seconds that are left, `anew`.
+export function visit(idle, { seated, kiosk, touched }) {
+  if (kiosk && (seated || touched)) {
+    if (idle >= LEAVE) return { do: "anew" };
+    if (seated && idle >= ASK) return { do: "ask", left: Math.ceil(LEAVE - idle) };
+  }
+  if (seated && idle >= TIP) return { do: "tip", number: Math.floor(idle / TIP) - 1 };
+  return { do: "nothing" };
+}
+
+// What goes on between the robot and a person, in the order of what they should know first: the name of a text, and a thing that it is about.
+export function moment(talk, robot, you) {
+  const bonds = talk.bonds.filter(({ by, to }) => (by === robot && to === you) || (by === you && to === robot));
+  const waits = (kind) => bonds.find((each) => each.kind === kind && each.by === robot && !each.met);
+  if (talk.voices.some(({ actor, to }) => actor === robot && to.includes(you))) {
+    const look = waits("directed_gaze");
+    return look ? { text: "about", about: look.about[0] } : { text: "listen" };
+  }
+  if (waits("adjacency_pair")) return { text: "looking" };
+  if (waits("directed_gaze")) return { text: "about", about: waits("directed_gaze").about[0] };
+  if (bonds.some((each) => each.kind === "mutual_facial_gaze" && each.met)) return { text: "mutual" };
+  return waits("mutual_facial_gaze") ? { text: "meet" } : null;
+}

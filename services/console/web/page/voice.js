@@ -1,0 +1,93 @@
+// The robot's voice, heard in the page in step with its words, wherever else the robot's own sound goes.
+import { element } from "./look.js";
+
+const AGAIN = 1000; // ms from a broken link to the next try
+const LOOK = 200; // ms between two looks at how the clocks of page and context stand
+const USUAL = 22050; // samples per second, until a voice has others
+const MISSED = 0.3; // seconds of sound that came too late, from which on that is told
+
+// What plays at a rate. worker: what hands it the sound. late: gets seconds that came too late.
+async function speaker(rate, worker, late) {
+  const context = new AudioContext({ sampleRate: rate, latencyHint: "interactive" });
+  await context.audioWorklet.addModule(new URL("page/speech.js", document.baseURI));
+  const node = new AudioWorkletNode(context, "speech", { numberOfInputs: 0, outputChannelCount: [1] });
+  node.connect(context.destination);
+  node.port.onmessage = ({ data }) => late(data);
+  const { port1, port2 } = new MessageChannel();
+  node.port.postMessage(port1, [port1]);
+  worker.postMessage({ port: port2, rate }, [port2]);
+  return {
+    context,
+    look() {
+      const { contextTime, performanceTime } = context.getOutputTimestamp();
+      if (context.state !== "running") return;
+      const heard = performanceTime > 0 ? contextTime : context.currentTime - (context.outputLatency || context.baseLatency || 0);
+      worker.postMessage({ stands: [heard, performance.timeOrigin + (performanceTime || performance.now())] });
+    },
+  };
+}
+
+export function voice(panel) {
+  const button = element("button", { type: "button", "aria-pressed": "false", id: "voice" });
+  const why = element("span", { class: "why", role: "status" });
+  const place = panel.querySelector(".sound");
+  place.replaceChildren(button, why);
+  let on = null; // what is open while it is on
+  const tell = (text) => why.textContent !== text && (why.textContent = text);
+  function show() {
+    button.setAttribute("aria-pressed", String(on !== null));
+    button.textContent = on ? "Mute the robot here" : "Hear the robot";
+  }
+
+  async function open(own, rate) {
+    if (own.rate === rate) return;
+    own.rate = rate;
+    own.speaker?.context.close();
+    try {
+      const made = await speaker(rate, own.worker, (seconds) => {
+        own.missed += seconds;
+        if (own.missed > MISSED) tell("Parts of the voice come too late to be heard: this page, or its link, is slow.");
+      });
+      if (on === own && own.rate === rate) own.speaker = made;
+      else made.context.close();
+    } catch (error) {
+      if (on === own) off(`The voice is not heard: ${error.message}.`);
+    }
+  }
+  function off(text = "") {
+    on?.worker.terminate();
+    on?.speaker?.context.close();
+    clearInterval(on?.timer);
+    on = null;
+    tell(text);
+    show();
+  }
+  function begin() {
+    const own = (on = { missed: 0, worker: new Worker(new URL("page/voice-link.js", document.baseURI), { type: "module" }) });
+    show();
+    const connect = () => own.worker.postMessage({ place: new URL("voice", document.baseURI).href });
+    own.worker.onmessage = ({ data }) => {
+      if (on !== own) return;
+      if (data.rate) open(own, data.rate);
+      if (data.ready) tell("");
+      if (data.ended) off(`The voice is not heard: ${data.ended}.`);
+      if (data.ended !== "") return;
+      tell("The voice is not heard: the link to the window is broken. It is made again.");
+      setTimeout(() => on === own && connect(), AGAIN);
+    };
+    own.worker.onerror = () => on === own && off("The voice is not heard: this browser does not run its worker.");
+    own.timer = setInterval(() => {
+      if (["suspended", "interrupted"].includes(own.speaker?.context.state)) own.speaker.context.resume();
+      own.speaker?.look();
+    }, LOOK);
+    open(own, USUAL); // at the press: later a browser may not let it sound
+    connect();
+  }
+  button.addEventListener("click", () => (on ? off() : begin()));
+  show();
+  return {
+    take(state, changed) {
+      if (changed.has("place")) place.hidden = true; // a recording has no sound
+    },
+  };
+}

@@ -1,0 +1,176 @@
+"""Sound of pages: the robot's voice, which they play, and their microphones. Each is a WebSocket, open while it is
+on.
+
+A page plays at instants of the window's clock, and tells by it when its microphone picked a sound up. It asks what
+that clock shows, again and again, by `{"asked": 12.5}`, and is answered `{"asked": 12.5, "now": 93.1}`, in seconds.
+Sound is binary: the instant of its first sample (float64), the number of the frame (uint32), to a page the samples
+per second as well (uint32), and then the samples, 16 bit, one channel; all of it little-endian.
+"""
+
+import asyncio
+import struct
+from collections.abc import Callable, Coroutine
+from math import isfinite
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.sound import SoundFrame
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.interface import Bus, Received
+from engage_hri.services.console.web.visitor import Visitor
+
+MOST_SOUNDS = 100
+"""Pages that may play the voice at once, and microphones."""
+WAITING = 64
+"""Frames of the voice that wait for a page that takes none: some 6 s. The oldest go."""
+RATE = 16_000
+"""Samples per second of a microphone."""
+LONGEST: Seconds = 0.25
+"""Sound that a page may send at a time."""
+BURST: Seconds = 3.0
+"""So much more sound than time has passed a page may send: what its link has kept back."""
+LATEST: Seconds = 10.0
+"""Age from which on sound of a microphone is of no use."""
+NOT_YOURS = 4403
+"""Code with which a link is closed to which a page has no right, or no more."""
+TOO_MUCH = 4408
+"""Code with which a link is closed whose page sends more sound than there is time."""
+NONSENSE = 1003
+"""Code of RFC 6455 with which a link is closed that sends what is no sound."""
+ROOM = 4429
+"""Code with which a link is closed for which there is no room."""
+_TO_PAGE = struct.Struct("<dII")
+_FROM_PAGE = struct.Struct("<dI")
+
+
+class AskedTime(Struct, frozen=True):
+    """Question of a page for the time. asked: by its own clock, seconds."""
+
+    asked: float
+
+
+class ToldTime(Struct, frozen=True):
+    """Answer to `AskedTime`. now: by the window's clock, seconds."""
+
+    asked: float
+    now: Seconds
+
+
+_asked = msgspec.json.Decoder(AskedTime)
+
+
+class Sounds:
+    """The links of all pages for sound. bus: the window's. visitor: finds the one at a page by its session."""
+
+    def __init__(self, bus: Bus, visitor: Callable[[str], Visitor | None]) -> None:
+        self._bus, self._visitor = bus, visitor
+        self._links = 0
+
+    async def voice(self, page: WebSocket) -> None:
+        """Let a page play the robot's voice, until it goes."""
+        await self._linked(page, self._play)
+
+    async def microphone(self, page: WebSocket) -> None:
+        """Publish the sound of a page's microphone as that of the person at it, until one of them goes."""
+        await self._linked(page, self._listen)
+
+    async def _linked(self, page: WebSocket, serve: Callable[[WebSocket], Coroutine[Any, Any, None]]) -> None:
+        await page.accept()  # who is refused before learns no reason
+        if self._links >= MOST_SOUNDS:
+            await page.close(ROOM, f"{MOST_SOUNDS} pages have sound already")
+            return
+        self._links += 1
+        try:
+            await serve(page)
+        except WebSocketDisconnect:
+            pass
+        except InputRefused as error:
+            await page.close(NOT_YOURS, str(error)[:120])
+        finally:
+            self._links -= 1
+
+    # -- the robot's voice ----------------------------------------------------------------------------------------
+
+    async def _play(self, page: WebSocket) -> None:
+        with self._bus.subscribe(keys.ROBOT_SOUND, capacity=WAITING) as inbox:
+
+            async def send() -> None:
+                async for received in inbox:
+                    if (told := self._for_page(received)) is not None:
+                        await page.send_bytes(told)
+
+            sending = asyncio.create_task(send(), name="voice for a page")
+            try:
+                await self._received(page)
+                await page.close(NONSENSE, "this link takes no sound")
+            finally:
+                sending.cancel()
+                await asyncio.wait([sending])
+
+    def _for_page(self, received: Received) -> bytes | None:
+        frame = received.message
+        if not isinstance(frame, SoundFrame):
+            return None
+        return _TO_PAGE.pack(self._bus.local(frame.at), frame.number & 0xFFFFFFFF, frame.rate) + frame.samples
+
+    # -- microphones ----------------------------------------------------------------------------------------------
+
+    async def _listen(self, page: WebSocket) -> None:
+        visitor = self._visitor(page.query_params.get("session", ""))
+        person = visitor.person if visitor is not None else ""
+        if visitor is None or not person:
+            await page.close(NOT_YOURS, "take a seat first: a microphone is that of a person")
+            return
+        key, numbers, begun, got = keys.sound(person), 0, self._bus.now(), 0.0
+        try:
+            while True:
+                content = await self._received(page)
+                if visitor.person != person:
+                    await page.close(NOT_YOURS, "you have left your seat")
+                    return
+                frame = self._of_page(content)
+                if frame is None:
+                    await page.close(NONSENSE, "this is no sound")
+                    return
+                got += len(frame.samples) / 2 / RATE
+                if got > self._bus.now() - begun + BURST:
+                    await page.close(TOO_MUCH, "more sound comes than there is time")
+                    return
+                numbers = max(numbers, frame.number)
+                if self._bus.now() - frame.at.seconds < LATEST:
+                    self._bus.publish(key, frame)
+        finally:
+            self._bus.publish(key, SoundFrame(at=self._bus.stamp(), rate=RATE, number=numbers + 1))
+
+    def _of_page(self, content: bytes) -> SoundFrame | None:
+        """The sound in what a page has sent; None: it is none. It was not picked up later than now."""
+        size = len(content) - _FROM_PAGE.size
+        if size <= 0 or size % 2 or size > 2 * LONGEST * RATE:
+            return None
+        at, number = _FROM_PAGE.unpack_from(content)
+        if not isfinite(at):
+            return None
+        at = min(at, self._bus.now() - size / 2 / RATE)
+        return SoundFrame(at=self._bus.stamp(at), rate=RATE, number=number, samples=content[_FROM_PAGE.size :])
+
+    # -- links ----------------------------------------------------------------------------------------------------
+
+    async def _received(self, page: WebSocket) -> bytes:
+        """Wait for sound, and tell the time meanwhile. Raises WebSocketDisconnect, after nonsense as well."""
+        while True:
+            message = await page.receive()
+            if message["type"] == "websocket.disconnect":
+                raise WebSocketDisconnect(message["code"])
+            if (content := message.get("bytes")) is not None:
+                return bytes(content)
+            try:
+                asked = _asked.decode(message.get("text") or "")
+            except (msgspec.DecodeError, RecursionError):
+                await page.close(NONSENSE, "this is no question for the time")
+                raise WebSocketDisconnect(NONSENSE) from None
+            await page.send_text(msgspec.json.encode(ToldTime(asked.asked, self._bus.now())).decode())

@@ -1,0 +1,1 @@
+"""Perception: services that find out what people do from sensors, and tell it on the bus, as others may."""

@@ -1,0 +1,35 @@
+"""Settings of hearing: which sound, whose voice, and who understands the words."""
+
+from msgspec import Struct
+
+from engage_hri.schemas.units import Seconds, positive
+
+
+class HearingConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Settings of hearing. Raises ValueError if out of range."""
+
+    source: str | tuple[str, ...] = "auto"
+    """The sound: a WAV file; a program that records: `parec`, `arecord`, `rec`, `sounddevice`; `auto`: the first of
+    these that is here; or a command, as a list, that writes raw samples (16 bit, little-endian, 16 kHz)."""
+    people: tuple[str, ...] = ()
+    """Ids of those who speak, one for each channel of the sound; empty: there is one channel, and who speaks is the
+    only person in the world, or else `visitor`."""
+    is_deaf_while_robot_speaks: bool | None = None
+    """Whether nothing is heard while the robot's voice sounds, since it cannot be told from a person's. Without a
+    value: yes for sound that is recorded now, no for a file."""
+    pause: Seconds = 0.3
+    """Silence that ends a speech."""
+    recognizer: str = ""
+    """Who understands the words: `sphinx`, `vosk`, `whisper`, `sherpa`, `endpoint`, or the name of another package's;
+    empty: nobody, and only voices are heard."""
+    language: str = "en"
+    """Language of the people, as a tag."""
+    model: str = ""
+    """Folder of the recognizer's model, or, of an `endpoint`, the name of the model there."""
+    phrases: tuple[str, ...] = ()
+    """Phrases to expect. `sphinx` understands nothing else; others may ignore them."""
+    address: str = ""
+    """Address of an `endpoint`, up to `/v1`. Its key is that of the environment: `ENGAGE_RECOGNIZER_KEY`."""
+
+    def __post_init__(self) -> None:
+        positive(self, ("pause",))

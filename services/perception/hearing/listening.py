@@ -1,0 +1,242 @@
+"""A recognizer at work for the service: in a process of its own, or in this one where time is virtual.
+
+    python -m engage_hri.services.perception.hearing.listening
+
+is that process: orders in on standard input, answers out on standard output, each with four bytes of length before
+it, little-endian, and in MessagePack. It ends with its standard input. Recognizers take seconds, need much memory,
+and some crash: hearing goes on.
+"""
+
+import asyncio
+import os
+import signal
+import sys
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable
+from typing import Any, BinaryIO
+
+import msgspec
+
+from engage_hri.schemas.advice import suggestion
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.perception.hearing.child import PipedProcess
+from engage_hri.services.perception.hearing.recognizing import (
+    Answer,
+    Desk,
+    NotUnderstood,
+    RecognizerSettings,
+    SpeechOrder,
+    SpeechRecognizer,
+)
+from engage_hri.services.runtime.installation import RECOGNIZERS, offers
+
+HEAD = 4
+"""Bytes of the length before each message."""
+MAKING: Seconds = 120.0
+"""Time in which a recognizer has to be there: it may have a large model to load."""
+LIMIT: Seconds = 20.0
+"""Time from the end of a speech within which its words have to be known."""
+MOST_UNREAD = 4 * 2**20
+"""Bytes of sound that may wait for a recognizer: two minutes. One that is so slow never catches up."""
+
+OnAnswer = Callable[[Answer], None]
+
+
+class Order(msgspec.Struct, frozen=True, tag=True):
+    """The first order: the recognizer to make. name: that of its offer."""
+
+    name: str
+    settings: RecognizerSettings
+
+
+class Made(msgspec.Struct, frozen=True, tag=True):
+    """The answer to it. fault: why there is none."""
+
+    fault: Fault | None = None
+
+
+def found(name: str, settings: RecognizerSettings) -> SpeechRecognizer:
+    """Find a recognizer, import it and make it. Raises InputRefused."""
+    offered = offers(RECOGNIZERS)
+    for offer in offered:
+        if offer.name == name:
+            try:
+                made: SpeechRecognizer = offer.load()(settings)
+            except ImportError as error:
+                advice = offer.advice(error)
+                raise InputRefused(Fault(reason=str(error), where="hearing.recognizer", advice=advice)) from error
+            return made
+    names = sorted({offer.name for offer in offered})
+    advice = suggestion(name, names) or f"one of {', '.join(names)}"
+    raise InputRefused(Fault(reason=f"no recognizer {name!r}", where="hearing.recognizer", advice=advice))
+
+
+class Understanding(ABC):
+    """A recognizer at work. Each speech gets one last answer: final words, or a failure."""
+
+    @abstractmethod
+    async def made(self) -> None:
+        """Wait until the recognizer is there. Raises InputRefused: it cannot be made."""
+
+    @abstractmethod
+    def hear(self, speech: int, samples: bytes) -> None:
+        """Let it have more sound of a speech. samples: empty: it is over."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """End it."""
+
+
+class InThisProcess(Understanding):
+    """A recognizer that stops the loop while it thinks: in virtual time that is no time."""
+
+    def __init__(self, order: Order, on_answer: OnAnswer) -> None:
+        self._order, self._on_answer = order, on_answer
+        self._desk: Desk | None = None
+
+    async def made(self) -> None:
+        self._desk = Desk(found(self._order.name, self._order.settings))
+
+    def hear(self, speech: int, samples: bytes) -> None:
+        assert self._desk is not None
+        for answer in self._desk.take(SpeechOrder(speech, samples)):
+            self._on_answer(answer)
+
+    def close(self) -> None:
+        self._desk = None
+
+
+class InItsOwn(Understanding):
+    """A recognizer in its own process. When that is lost, the speeches that it has not answered have failed, and the
+    next speech starts another one."""
+
+    def __init__(self, order: Order, on_answer: OnAnswer) -> None:
+        self._order, self._on_answer = order, on_answer
+        self._loop = asyncio.get_running_loop()
+        self._child: PipedProcess | None = None
+        self._buffer = bytearray()
+        self._made: asyncio.Future[None] = self._loop.create_future()
+        self._open: dict[int, asyncio.TimerHandle | None] = {}
+        """Speeches without a last answer, and from their ends on the time that is left."""
+        self._failed: deque[int] = deque(maxlen=64)
+        """Speeches that have failed while they went on: what more is heard of them is for nobody."""
+
+    async def made(self) -> None:
+        self._start()
+        try:
+            await asyncio.wait_for(asyncio.shield(self._made), MAKING)
+        except TimeoutError:
+            reason = f"the recognizer {self._order.name} is not there after {MAKING:g} s"
+            raise InputRefused(Fault(reason=reason, where="hearing.recognizer")) from None
+
+    def hear(self, speech: int, samples: bytes) -> None:
+        if speech in self._failed:
+            return
+        if self._child is None:
+            self._start()
+        if self._child is None:
+            return
+        self._open.setdefault(speech, None)
+        self._child.write(_packed(SpeechOrder(speech, samples)))
+        if not samples:
+            self._open[speech] = self._loop.call_later(LIMIT, self._lose, f"does not answer for {LIMIT:g} s")
+        elif self._child.unsent > MOST_UNREAD:
+            self._lose("is too slow for speech")
+
+    def close(self) -> None:
+        if self._child is not None:
+            self._child.close()
+            self._child = None
+        for timer in self._open.values():
+            if timer is not None:
+                timer.cancel()
+        self._open.clear()
+
+    def _start(self) -> None:
+        self._buffer.clear()
+        command = [sys.executable, "-m", "engage_hri.services.perception.hearing.listening"]
+        self._child = PipedProcess(command, self._take, self._lose)
+        self._child.write(_packed(self._order))
+
+    def _take(self, more: bytes) -> None:
+        self._buffer += more
+        while len(self._buffer) >= HEAD:
+            size = int.from_bytes(self._buffer[:HEAD], "little")
+            if len(self._buffer) < HEAD + size:
+                return
+            content = bytes(self._buffer[HEAD : HEAD + size])
+            del self._buffer[: HEAD + size]
+            self._answered(msgspec.msgpack.decode(content, type=Made | Answer))
+
+    def _answered(self, answer: Made | Answer) -> None:
+        if isinstance(answer, Made):
+            if answer.fault is not None:
+                self._lose("cannot be made", answer.fault)
+            elif not self._made.done():
+                self._made.set_result(None)
+            return
+        if isinstance(answer, NotUnderstood) or answer.final:
+            timer = self._open.pop(answer.speech, None)
+            if timer is not None:
+                timer.cancel()
+            elif isinstance(answer, NotUnderstood) and self._child is not None:  # given up while it went on
+                self._failed.append(answer.speech)
+                self._child.write(_packed(SpeechOrder(answer.speech, b"")))
+        self._on_answer(answer)
+
+    def _lose(self, how: str, fault: Fault | None = None) -> None:
+        fault = fault or Fault(reason=f"the recognizer {self._order.name} {how}", where="hearing.recognizer")
+        lost = tuple(self._open)
+        self.close()
+        if not self._made.done():
+            self._made.set_exception(InputRefused(fault))
+        for speech in lost:
+            self._failed.append(speech)
+            self._on_answer(NotUnderstood(speech, fault))
+
+
+# -- its process ---------------------------------------------------------------------------------------------------
+
+
+def _packed(message: msgspec.Struct) -> bytes:
+    content = msgspec.msgpack.encode(message)
+    return len(content).to_bytes(HEAD, "little") + content
+
+
+def _unpacked(file: BinaryIO, kind: Any) -> Any:
+    """The next message; None: there is none any more."""
+    head = file.read(HEAD)
+    content = file.read(int.from_bytes(head, "little")) if len(head) == HEAD else b""
+    return msgspec.msgpack.decode(content, type=kind) if content else None
+
+
+def main() -> None:
+    """Serve until standard input ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the service that asks
+    out = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what an engine prints is no answer
+
+    def answer(message: msgspec.Struct) -> None:
+        try:
+            out.write(_packed(message))
+            out.flush()
+        except BrokenPipeError:  # whoever asks is gone
+            os._exit(0)
+
+    order = _unpacked(sys.stdin.buffer, Order)
+    try:
+        desk = Desk(found(order.name, order.settings))
+    except Exception as error:
+        reason = f"the recognizer {order.name} cannot be made: {type(error).__name__}: {error}"
+        answer(Made(error.fault if isinstance(error, EngageError) else Fault(reason=reason)))
+        return
+    answer(Made())
+    while (sound := _unpacked(sys.stdin.buffer, SpeechOrder)) is not None:
+        for each in desk.take(sound):
+            answer(each)
+
+
+if __name__ == "__main__":
+    main()

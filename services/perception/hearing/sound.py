@@ -1,0 +1,111 @@
+"""Sound as numbers: WAV files, samples of other rates, and when samples of a device were captured. Pure."""
+
+import wave
+from typing import BinaryIO
+
+import numpy as np
+from msgspec import Struct
+from numpy.typing import NDArray
+
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.perception.hearing.voice import RATE, Samples
+
+ADVICE = "make it one: ffmpeg -i FILE -ar 16000 -c:a pcm_s16le FILE.wav"
+TAPS = 16
+"""Zero crossings of the filter on each side of a sample, where the rate is changed."""
+AT_ONCE = 1 << 15
+"""Samples that are converted at once."""
+
+
+class Piece(Struct, frozen=True):
+    """A piece of sound. samples: a row for each instant, a column for each channel. at: loop time of the first."""
+
+    samples: Samples
+    at: Seconds
+
+
+def read_wav(file: BinaryIO, name: str) -> Samples:
+    """Read a WAV file, at `RATE`: a row for each instant, a column for each channel.
+
+    file: open. name: for people. Raises InputRefused: it is no WAV file with samples of 16 bits.
+    """
+    try:
+        with wave.open(file) as read:
+            channels, width, rate = read.getnchannels(), read.getsampwidth(), read.getframerate()
+            content = read.readframes(read.getnframes())
+    except (wave.Error, EOFError) as error:
+        reason = f"it is no WAV file that can be read: {str(error) or 'it ends too early'}"
+        raise InputRefused(Fault(reason=reason, where=name, advice=ADVICE)) from error
+    if width != 2:
+        raise InputRefused(Fault(reason=f"its samples have {8 * width} bits, not 16", where=name, advice=ADVICE))
+    whole = len(content) - len(content) % (2 * channels)
+    samples = np.frombuffer(content[:whole], "<i2").reshape(-1, channels)
+    return np.column_stack([resampled(samples[:, channel], rate) for channel in range(channels)])
+
+
+def resampled(samples: Samples, rate: int) -> Samples:
+    """Convert one channel to `RATE`: by a sinc in a cosine window, so that nothing above half the rate folds down.
+
+    rate: samples per second that it has.
+    """
+    if rate == RATE or not len(samples):
+        return samples.astype(np.int16)
+    cut = min(1.0, RATE / rate)
+    """Share of the frequencies that remain."""
+    reach = int(np.ceil(TAPS / cut))
+    padded = np.pad(samples.astype(np.float64), reach)
+    count = len(samples) * RATE // rate
+    steps = np.arange(-reach + 1, reach + 1)
+    made = []
+    for first in range(0, count, AT_ONCE):
+        places = np.arange(first, min(count, first + AT_ONCE)) * (rate / RATE)
+        whole = places.astype(np.int64)
+        away: NDArray[np.float64] = steps[None, :] - (places - whole)[:, None]
+        window = np.cos(np.clip(away / reach, -1, 1) * (np.pi / 2)) ** 2
+        weights = cut * np.sinc(cut * away) * window
+        made.append((padded[whole[:, None] + steps[None, :] + reach] * weights).sum(axis=1))
+    clipped: Samples = np.clip(np.rint(np.concatenate(made)), -32768, 32767).astype(np.int16)
+    return clipped
+
+
+LATE: Seconds = 0.1
+"""Time by which samples are later than the others from which on some before them may have been lost."""
+FOR: Seconds = 0.5
+"""Time for which all have to be late before that is believed: the machine may stand still."""
+DRIFT = 1e-3
+"""Share by which the clock of a device may be slower than ours; those of sound cards differ by less than a tenth."""
+
+
+class SampleClock:
+    """Times at which samples were captured, of a device that counts them by a clock of its own.
+
+    A sample cannot come before it was captured, and what comes soonest has been on its way for the shortest time. So
+    the stream began at the earliest of all beginnings that its pieces let one think of, and a slow clock lets this
+    moment wander later. Where samples were lost, all that follow are late.
+    """
+
+    def __init__(self) -> None:
+        self._begin: Seconds | None = None
+        """Loop time of sample 0, as far as one can tell."""
+        self._late: tuple[Seconds, Seconds] | None = None
+        """Since when all were late, and the earliest beginning that they let one think of."""
+        self._count = 0
+        self._last: Seconds = 0.0
+
+    def take(self, count: int, arrived: Seconds) -> Seconds:
+        """Take note of the next samples. Returns the loop time of the first. arrived: loop time of their arrival."""
+        begin = arrived - (self._count + count) / RATE
+        if self._begin is None:
+            self._begin = begin
+        if begin <= self._begin + LATE:
+            self._late = None
+        else:
+            since, earliest = self._late or (arrived, begin)
+            self._late = since, min(earliest, begin)
+            if arrived - since >= FOR:
+                self._begin, self._late = self._late[1], None
+        self._begin = min(begin, self._begin + DRIFT * max(0.0, arrived - self._last))
+        at = self._begin + self._count / RATE
+        self._count, self._last = self._count + count, arrived
+        return at

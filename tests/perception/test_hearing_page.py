@@ -1,0 +1,50 @@
+"""docs/hearing.md: what it shows is right. No microphone is here, so its command is read, and not run."""
+
+import re
+import shlex
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from engage_hri.services.commandline.shell.roster import SENSES, group
+from engage_hri.services.commandline.shell.settings import RobotConfig
+from engage_hri.services.perception.hearing.microphone import RECORDERS
+from engage_hri.services.perception.hearing.recognizing import RecognizerSettings, SpeechWords, settings_of
+from engage_hri.services.runtime.configuration import read
+from engage_hri.services.runtime.installation import RECOGNIZERS, offers
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "hearing.md").read_text(encoding="utf-8")
+
+
+def shown(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+
+
+def test_its_command_has_settings_that_there_are():
+    [(_, command)] = [block.strip().splitlines() for block in shown("sh")]
+    words = shlex.split(command)
+    assert words[:2] == [".venv/bin/engage", "run"]
+    assert group(words[2]) == SENSES
+
+    settings = [value for option, value in pairwise(words) if option == "--set"]
+    config = read(RobotConfig, settings=settings).hearing
+    assert settings_of(config).phrases == ("yes", "no", "the blue one")
+    for setting in re.findall(r"`hearing\.(\w+)", PAGE):
+        assert setting in config.__struct_fields__
+
+
+def test_its_recognizer_is_one():
+    [code] = shown("python")
+    names: dict[str, type] = {}
+    exec(code, names)
+    listening = names["MyRecognizer"](RecognizerSettings()).listen()
+    listening.hear(np.zeros(160, np.int16))
+    assert listening.end() == SpeechWords("160 samples")
+
+
+def test_it_tells_of_all_recognizers_and_programs_that_record():
+    rows = set(re.findall(r"^\| `(\w+)` \|", PAGE, re.MULTILINE))
+    assert rows == {each.name for each in offers(RECOGNIZERS) if each.is_ours}
+    for name in RECORDERS:
+        assert f"`{name}`" in PAGE
