@@ -40,11 +40,16 @@ class ActionEnded(Struct, frozen=True, kw_only=True, tag="action_ended", omit_de
     behavior: str = ""
 
 
+ANOTHER_ID = "`same_as` takes the id of a person, or the own id, which takes back what was said before"
+"""What to do where `ActorFound.same_as` was no person's id."""
+
+
 class ActorFound(Struct, frozen=True, kw_only=True, tag="actor_found", omit_defaults=True):
     """evt: perception sees this person, for the first time or again.
 
     same_as: another id that it has told of, of the same person: it has found out so. Events of both are told under
-    that one from now on, and those of before once more.
+    that one from now on, and those of before once more. It corrects what was told so of `actor` before; the own id
+    takes that back.
     """
 
     actor: str
@@ -53,10 +58,14 @@ class ActorFound(Struct, frozen=True, kw_only=True, tag="actor_found", omit_defa
 
 
 class ActorLost(Struct, frozen=True, kw_only=True, tag="actor_lost", omit_defaults=True):
-    """evt: perception no longer sees this person. Connection events that are open with them end."""
+    """evt: perception no longer sees this person. Connection events that are open with them end.
+
+    left: it knows that they went away. Else another id that is found there soon may be the same person.
+    """
 
     actor: str
     at: Stamp
+    left: bool = False
 
 
 class OngoingActions(Struct, frozen=True, kw_only=True, tag="ongoing_actions", omit_defaults=True):

@@ -23,7 +23,7 @@ class Entity(Struct, frozen=True, kw_only=True, omit_defaults=True):
     radius: metres around `position`; 0: that of the footprint, or unknown.
     category, size, color, shape, name, features: words for phrases about it; empty: unknown. Without a category the
     noun is its shape, its name, or a part of its id.
-    confidence: of perception, 0..1.
+    confidence: of perception, 0..1. placeless: nobody has measured `position`, which only shows where one may look.
     """
 
     id: Named
@@ -46,6 +46,7 @@ class Entity(Struct, frozen=True, kw_only=True, omit_defaults=True):
     velocity: Vector = (0.0, 0.0, 0.0)
     """m/s"""
     confidence: Probability = 1.0
+    placeless: bool = False
 
 
 class World(Struct, frozen=True, kw_only=True, tag="world", omit_defaults=True):

@@ -10,7 +10,7 @@ nothing in here reads a clock (services/runtime/intake.py says why).
 
 from collections.abc import Iterable
 from math import inf, isnan
-from typing import TypeGuard, get_args
+from typing import Literal, TypeGuard, get_args
 
 from msgspec.structs import replace
 
@@ -21,6 +21,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import HeadOwner
 from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.perception import (
+    ANOTHER_ID,
     ActionBegan,
     ActionEnded,
     ActorFound,
@@ -211,9 +212,8 @@ class Intake:
         is_here = before is not None and before.presence.here
         goes_on = newer not in session.persons or (is_here and not session.has_open_event(newer))
         kept, other = (former, newer) if goes_on else (newer, former)
-        names = {self._identities.name(kept), self._identities.name(other)} - {join.name}
-        self._identities.join(kept, other, join.name)
-        self._tell_again(names, join.name)
+        self._identities.join(kept, other)
+        self._tell_again(join.before, join.name)
         if kept != other:
             going = self._reports.join(other, kept)
             self._note(self._recognizer.join(other, kept, now))
@@ -223,7 +223,8 @@ class Intake:
     def _part(self, parting: Parting) -> None:
         """Take a person for another than was guessed. What is open with them is told as theirs from now on."""
         at, actor = Stamp(self._clock.name, self._now), parting.id
-        if actor == parting.name:
+        self._tell(self._reports.part(parting.leaving, parting.old, parting.new, self._now))
+        if actor == parting.new:
             return  # recognition knows whose id it was by that person's own
         for id, before in tuple(self._told.items()):
             if before.person(self._robot) == parting.name and before.state not in ENDINGS:
@@ -238,21 +239,20 @@ class Intake:
         same = SamePeople(at=Stamp(self._clock.name, self._now), people=self._identities.others())
         self._outputs.append(PublishMessage(keys.SAME_PEOPLE, same))
 
-    def _tell_again(self, names: set[str], name: str) -> None:
-        """Tell what was told of a person by other names by this one, as far as it is remembered."""
+    def _tell_again(self, other: str, name: str) -> None:
+        """Tell what was told of a person by another name by this one, as far as it is remembered."""
         at, out = Stamp(self._clock.name, self._now), self._outputs
         for id, before in tuple(self._told.items()):
-            if before.person(self._robot) in names:
+            if before.person(self._robot) == other:
                 event = self._told[id] = self._identities.outward(
                     replace(self._identities.inward(before), at=at, retold=True)
                 )
                 out.append(PublishMessage(keys.connection_event(name, event.kind), event))
-        for other in sorted(names):
-            for message in self._open_events.join(other, name, at):
-                out.append(PublishMessage(keys.open_events(message.actor), message))
-            self._statistics.join(other, name)
-            states = (keys.open_events(other), *([keys.statistics(other)] if other != "all" else []))
-            out.append(WithdrawStates(states))
+        for message in self._open_events.join(other, name, at):
+            out.append(PublishMessage(keys.open_events(message.actor), message))
+        self._statistics.join(other, name)
+        states = (keys.open_events(other), *([keys.statistics(other)] if other != "all" else []))
+        out.append(WithdrawStates(states))
         self._note(())
 
     def _take(self) -> list[Output]:
@@ -285,7 +285,7 @@ class Intake:
     def _is_credible(self, input: Input[Content]) -> bool:
         """True if the message came from its proper sender: the robot's body for the robot, perception for people."""
         match input.message:
-            case ActorFound(same_as=former) if former == self._robot or (former and not self._has_valid_id(former)):
+            case ActorFound(same_as=former) if former and not self._can_be_person(former):
                 return False
             case ActionBegan() | ActionEnded() | ActorFound() | ActorLost() as event:
                 return self._has_valid_id(event.actor)
@@ -301,11 +301,19 @@ class Intake:
 
     def _has_valid_id(self, actor: str) -> bool:
         """True if the id can be in a key; without that there are no events. A bad id is reported once."""
-        if keys.is_chunk(actor):
-            return True
-        if actor not in self._bad_ids and len(self._bad_ids) < COMPLAINTS:
-            self._bad_ids.add(actor)
-            fault = Fault(reason=f"{actor!r} can't be in a key", advice=keys.CHUNK, service="recognition")
+        return keys.is_chunk(actor) or self._complain(actor, f"{actor!r} can't be in a key", keys.CHUNK)
+
+    def _can_be_person(self, actor: str) -> bool:
+        """True if somebody can be the same person as this. What cannot be one is reported once."""
+        if actor == self._robot or actor in self._identities.things:
+            kind = "the robot" if actor == self._robot else "a thing of the world"
+            return self._complain(actor, f"nobody can be the same person as {actor!r}: it is {kind}", ANOTHER_ID)
+        return self._has_valid_id(actor)
+
+    def _complain(self, id: str, reason: str, advice: str) -> Literal[False]:
+        if id not in self._bad_ids and len(self._bad_ids) < COMPLAINTS:
+            self._bad_ids.add(id)
+            fault = Fault(reason=reason, advice=advice, service="recognition")
             self._outputs.append(PublishMessage(keys.fault("recognition"), fault))
         return False
 

@@ -14,7 +14,7 @@ goes on with what it said.
 """
 
 from collections import OrderedDict, deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Literal, NamedTuple
 
 from msgspec.structs import replace
@@ -131,10 +131,14 @@ class ActionReports:
         return told
 
     def _take_same(self, message: SamePeople, now: Seconds) -> list[TimedReport]:
-        """Take news of who is one person: one of the two is lost, and what this one does goes on with the other."""
-        told: list[TimedReport] = []
+        """Take news of who is one person: one of the two is lost, and what this one does goes on with the other.
+
+        Whoever was taken for another by mistake is somebody else again first.
+        """
+        parted = self._names.parted(message)
         if not self._names.take(message):
-            return told
+            return []
+        told = [report for id, name in parted for report in self.part({id}, name, id, now)]
         at = Stamp(self._clock, now)
         for other, name in ((each.actor, each.name) for each in message.people):
             known = [one.reports[other] for one in self._reporters.values() if other in one.reports]
@@ -360,8 +364,40 @@ class ActionReports:
         going: list[GoesOn] = []
         for one in self._reporters.values():
             if (report := one.reports.pop(other, None)) is not None:
-                going += self._report(one, kept).join(report, kept)
+                is_new = kept not in one.reports
+                joined = self._report(one, kept)
+                going += joined.join(report, kept)
+                joined.was = other if is_new else ""
         return going
+
+    def part(self, ids: Collection[str], kept: str, other: str, now: Seconds) -> list[TimedReport]:
+        """Take two for persons of their own that were taken for one, `kept`. Returns what follows.
+
+        ids: those of the other, by which it is not `kept` from now on, but `other`. A reporter that has told of both
+        is taken to tell of `kept`, until it tells more.
+        """
+        told: list[TimedReport] = []
+        at = Stamp(self._clock, now)
+        for one in self._reporters.values():
+            if (report := one.reports.get(kept)) is None or report.was not in ids:
+                continue
+            del one.reports[kept]
+            going = self._report(one, other).join(report, other)
+            if one.standing == "silenced":
+                continue
+            told += [TimedReport(each, now, is_sure=False) for each in report.ends(self._is_over)]
+            if report.seen:
+                if not any(each.seen for each in self._all(kept)):
+                    told.append(TimedReport(ActorLost(actor=kept, at=at), now, is_sure=False))
+                told.append(TimedReport(ActorFound(actor=other, at=at), now, is_sure=False))
+            told += [TimedReport(each, now) for each in going]
+        return told
+
+    def _all(self, actor: str) -> list[Report]:
+        return [one.reports[actor] for one in self._reporters.values() if actor in one.reports]
+
+    def _is_over(self, action: ActionBegan) -> bool:
+        return not any(report.says(action) for report in self._all(action.actor))
 
     def forget(self, actor: str) -> None:
         """Drop a person who has been gone for long from all reporters."""

@@ -137,6 +137,8 @@ class Report:
         self._tells_states = False
         self._before_loss: dict[tuple[object, ...], ActionBegan] = {}
         """What went on when the person was lost, until a state says what has become of it."""
+        self.was = ""
+        """Another id of the same person, by which all of it was told."""
 
     @property
     def actions(self) -> tuple[ActionBegan, ...]:

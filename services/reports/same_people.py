@@ -14,6 +14,7 @@ from typing import TypeVar
 from msgspec import Struct
 from msgspec.structs import replace
 
+from engage_hri.schemas.perception import ActorFound
 from engage_hri.schemas.recognition import SamePeople
 from engage_hri.schemas.world import Entity, World
 
@@ -37,6 +38,11 @@ class PeopleNames:
             return False
         before, self._names = self._names, {each.actor: each.name for each in message.people}
         return self._names != before
+
+    def parted(self, message: SamePeople) -> list[tuple[str, str]]:
+        """List who is somebody else by this message: their id, and the name that they had by mistake."""
+        names = {each.actor: each.name for each in message.people}
+        return [(id, name) for id, name in self._names.items() if names.get(id, id) != names.get(name, name)]
 
     def name(self, id: str) -> str:
         """Return the name of the person with this id; of a thing its id."""
@@ -69,6 +75,8 @@ def renamed(message: AnyStruct, name: Callable[[str], str]) -> AnyStruct:
             changes[field] = new
     if not changes:
         return message
+    if isinstance(message, ActorFound):
+        changes["same_as"] = ""  # that was said of the other id
     changed = replace(message, **changes)
     if isinstance(message, World) and isinstance(changed, World):
         return replace(changed, entities=_one_each(message, changed))

@@ -16,6 +16,7 @@ from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.language_models import perform_call
+from engage_hri.services.client.people.perceive import perceive
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import load
@@ -35,7 +36,7 @@ class Eyes:
     """A robot, and a camera before it."""
 
     def __init__(self, hub: MemoryHub, robot: Robot, picture: Picture) -> None:
-        self.robot, self.picture = robot, picture
+        self.hub, self.robot, self.picture = hub, robot, picture
         self.owners: list[HeadOwner] = []
         self._bus = hub.join("eyes")
         self._bus.declare_alive()
@@ -168,5 +169,60 @@ def test_a_guess_is_taken_back_for_all() -> None:
         await asyncio.sleep(0.5)
         assert sorted(await eyes.people()) == [("ann", NEXT), ("face_3", ANN)]
         assert sorted(eyes.picture.present) == ["ann", "face_3"]
+
+    play(story)
+
+
+@pytest.mark.parametrize("correction", ["bob", "face_3"])
+def test_a_later_word_corrects_an_earlier_one_for_all(correction: str) -> None:
+    """Each person has a reporter of their own."""
+
+    async def story(eyes: Eyes) -> None:
+        eyes.tell(ActorLost, "ann")
+        eyes.see()
+        told: list[tuple[str, str, str]] = []
+
+        async def follow() -> None:
+            async for each in eyes.robot.actions():
+                if isinstance(each, ActorFound | ActorLost):
+                    told.append(
+                        (type(each).__name__, each.actor, each.same_as if isinstance(each, ActorFound) else "")
+                    )
+
+        task = asyncio.create_task(follow())
+        async with perceive("bob", hub=eyes.hub, position=NEXT) as bob, perceive("face_3", hub=eyes.hub) as face:
+            async with perceive("ann", hub=eyes.hub, position=ANN) as ann:
+                for person in (ann, bob, face):
+                    await person.look_at(person.robot)
+                await asyncio.sleep(0.5)
+                face.same_as("ann")
+                await asyncio.sleep(0.5)
+                assert {id for id, _ in await eyes.people()} == {"ann", "bob"}
+                face.same_as(correction)
+                await asyncio.sleep(0.5)
+                after = {"ann", "bob", correction}
+                assert {id for id, _ in await eyes.people()} == after == set(eyes.picture.present)
+                assert all(not same_as or actor == "face_3" for _, actor, same_as in told)
+                outcome = await eyes.say("Hello Ann.", addressee="ann")
+                assert outcome.eye_contact
+            await asyncio.sleep(0.5)
+            assert {id for id, _ in await eyes.people()} == after - {"ann"} == set(eyes.picture.present)
+            assert told[-1][:2] == ("ActorLost", "ann"), "the reporter of the face sees ann no more"
+        task.cancel()
+
+    play(story)
+
+
+def test_two_who_come_one_after_the_other_are_two_people() -> None:
+    """Who tells of them says nothing of places, and that the first leaves."""
+
+    async def story(eyes: Eyes) -> None:
+        eyes.see()
+        async with perceive("cleo", hub=eyes.hub) as cleo:
+            await cleo.say("Hello there.")
+        await asyncio.sleep(1.0)
+        async with perceive("ben", hub=eyes.hub) as ben:
+            await ben.say("Good day.")
+            assert [id for id, _ in await eyes.people()] == ["ben"]
 
     play(story)

@@ -380,11 +380,13 @@ async def test_a_person_says_who_it_is_the_same_as(hub: MemoryHub) -> None:
         with hub.join("reader").subscribe(keys.PERCEIVED_ACTION) as told:
             async with perceive("face_3", hub=hub) as face:
                 face.same_as("ann")
-                for wrong in ("", "a/b", "face_3", face.robot):
-                    with pytest.raises(InputRefused):
+                face.same_as("face_3")
+                face.bring(Entity(id="cup", kind="object", position=(0.5, 0.0, 0.7)))
+                for wrong in ("", "a/b", "cup", face.robot):
+                    with pytest.raises(InputRefused, match="own id"):
                         face.same_as(wrong)
             found = [(await told.next()).message for _ in range(len(told))]
 
     assert [(each.actor, each.same_as) for each in found if isinstance(each, ActorFound)] == [
-        ("face_3", ""), ("face_3", "ann"),
+        ("face_3", ""), ("face_3", "ann"), ("face_3", "face_3"),
     ]  # fmt: skip

@@ -8,8 +8,17 @@ from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose, OngoingActions
+from engage_hri.schemas.perception import (
+    ANOTHER_ID,
+    ActionBegan,
+    ActionEnded,
+    ActorFound,
+    ActorLost,
+    HeadPose,
+    OngoingActions,
+)
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, OpenEvents, SamePeople, Statistics
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
@@ -47,7 +56,7 @@ class Told:
         self.outputs: list[Output] = []
         self.now = 0.0
 
-    def take(self, at: float, *messages: Message) -> None:
+    def take(self, at: float, *messages: Message, source: str = "camera") -> None:
         self.until(at)
         for message in messages:
             key = keys.PERCEIVED_ACTION
@@ -58,7 +67,7 @@ class Told:
                     key = keys.head_pose(actor)
                 case ActionBegan(actor="robot") | ActionEnded(actor="robot"):
                     key = keys.ROBOT_ACTION
-            self.outputs += self.intake.take(Input(key, message, "camera", at), at)
+            self.outputs += self.intake.take(Input(key, message, source, at), at)
 
     def until(self, end: float) -> None:
         while (due := self.intake.deadline) is not None and due <= end:
@@ -233,6 +242,85 @@ def test_two_heads_side_by_side_are_two_people() -> None:
 
 def pose(actor: str, at: float, y: float) -> HeadPose:
     return HeadPose(actor=actor, position=(1.2, y, 1.2), direction=(0.0, 1.0, 0.0), at=stamp(at))
+
+
+@pytest.mark.parametrize("is_open", [False, True])
+@pytest.mark.parametrize("correction", ["bob", "face_3"])
+def test_a_later_word_corrects_an_earlier_one(is_open: bool, correction: str) -> None:
+    """is_open: recognition knows ann by the other id meanwhile, for an event with that is open."""
+    told = Told()
+    for who in ("ann", "bob", "face_3"):
+        told.take(0.0, ActorFound(actor=who, at=stamp(0.0)), source=who)
+    told.take(0.5, ActionBegan(actor="ann", action="look", at=stamp(0.5), targets=(ROBOT,)), source="ann")
+    told.until(4.0)  # the event of this look has failed, and the look goes on
+    if is_open:
+        told.take(4.1, ActionBegan(actor="face_3", action="look", at=stamp(4.1), targets=(ROBOT,)), source="face_3")
+    told.take(4.5, ActorFound(actor="face_3", at=stamp(4.5), same_as="ann"), source="face_3")
+    assert told.same() == {"face_3": "ann"}
+    told.take(4.6, ActorFound(actor="face_3", at=stamp(4.6), same_as=correction), source="face_3")
+
+    assert told.same() == ({"face_3": "bob"} if correction == "bob" else {})
+    session, inside = told.intake._recognizer.session, told.intake._identities.inside
+    assert session.scene.present == {"ann", inside("face_3"), inside("bob")}
+    assert session.persons["ann"].contact == 1.0, "ann looks, as was told before"
+    assert session.persons[inside("face_3")].contact == (1.0 if is_open else None)
+    assert [(each.initiator, each.state) for each in told.events][-1] == (
+        (correction, "started") if is_open else ("ann", "failed")
+    )
+
+    told.take(7.0, ActionBegan(actor="face_3", action="look", at=stamp(7.0)), source="face_3")
+    told.take(8.0, ActionBegan(actor="face_3", action="look", at=stamp(8.0), targets=(ROBOT,)), source="face_3")
+    assert told.events[-1].initiator == correction
+    told.take(9.0, ActorLost(actor="ann", at=stamp(9.0)), source="ann")
+    told.until(15.0)
+    assert "ann" not in session.scene.present
+
+
+def test_who_was_joined_by_an_id_goes_with_it() -> None:
+    told = Told()
+    told.found("face_3", 0.0, same_as="ann")
+    told.found("face_4", 0.1, same_as="face_3")
+    told.found("face_5", 0.2, same_as="ann")
+    told.found("face_3", 0.3, same_as="bob")
+    assert told.same() == {"face_3": "bob", "face_4": "bob", "face_5": "ann"}
+    told.found("face_4", 0.4, same_as="face_4")
+    assert told.same() == {"face_3": "bob", "face_5": "ann"}
+    told.found("ann", 0.5, same_as="face_5")
+    assert told.same() == {"face_3": "bob", "ann": "face_5"}
+    told.found("ann", 0.6, same_as="ann")
+    assert told.same() == {"face_3": "bob"}
+
+
+@pytest.mark.parametrize("thing", [ROBOT, PIECES[0], "nowhere"])
+def test_nobody_is_a_thing(thing: str) -> None:
+    told = Told()
+    told.take(0.0, people_at(PLACES))
+    told.found("face_3", 0.0, same_as=thing)
+    told.found("face_3", 0.1, same_as=thing)
+
+    faults = [each for each in told.messages(Fault) if isinstance(each, Fault)]
+    assert [each.advice for each in faults] == ([] if thing == "nowhere" else [ANOTHER_ID])
+    told.begins("face_3", "look", 1.0, ROBOT)
+    assert told.lives() == [("started", "nowhere" if thing == "nowhere" else "face_3", ROBOT)]
+
+
+@pytest.mark.parametrize("why", ["left", "its place is nobody's", "the other's is", "neither"])
+def test_no_guess_by_a_place_that_nobody_measured_or_of_who_is_known_to_have_left(why: str) -> None:
+    def there(who: str, *, placeless: bool) -> World:
+        seen = people_at({who: PLACES["ann"]})
+        return World(
+            entities=tuple(replace(one, placeless=placeless and one.kind == "person") for one in seen.entities)
+        )
+
+    told = Told()
+    told.found("ann", 0.0)
+    told.take(0.0, there("ann", placeless=why == "the other's is"))
+    told.take(1.0, people_at({}), ActorLost(actor="ann", at=stamp(1.0), left=why == "left"))
+    told.take(2.0, there("ben", placeless=why == "its place is nobody's"))
+    told.found("ben", 2.0)
+    told.begins("ben", "look", 2.5, ROBOT)
+
+    assert [each.initiator for each in told.events] == ["ann" if why == "neither" else "ben"]
 
 
 def test_nobody_is_the_robot_or_has_an_id_that_cannot_be_in_a_key() -> None:
@@ -416,7 +504,7 @@ def test_memory_stays_flat_however_often_an_id_changes() -> None:
         found = ActorFound(actor=f"face_{number}", at=stamp(number), same_as="ann")
         for join in identities.take(found, float(number)):
             assert isinstance(join, Join)
-            identities.join(join.former, join.newer, join.name)
+            identities.join(join.former, join.newer)
         sizes.append(sum(kinds(identities).values()))
 
     assert max(sizes) <= 1.1 * sizes[2 * IDS_KEPT]

@@ -42,7 +42,7 @@ class PersonActions:
         self.look = None
         if self.is_here:
             self.is_here = False
-            yield ActorLost(actor=self.person, at=at)
+            yield ActorLost(actor=self.person, at=at, left=True)
 
     def looks(self, targets: tuple[str, ...], at: Stamp) -> Iterator[ActionEvent]:
         """Look at these; empty: away from everything. A look at what is looked at already changes nothing."""

@@ -15,7 +15,7 @@ from engage_hri.schemas.advice import suggestion
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import LONGEST_ID, LONGEST_TEXT, ActorFound, Utterance
+from engage_hri.schemas.perception import ANOTHER_ID, LONGEST_ID, LONGEST_TEXT, ActorFound, Utterance
 from engage_hri.schemas.text import is_utf8
 from engage_hri.schemas.units import A_DAY, Seconds, Stamp, Vector
 from engage_hri.schemas.world import Entity, World
@@ -91,14 +91,21 @@ class PerceivedPerson:
     def same_as(self, other: str) -> None:
         """Tell that this person is one who was told of by another id: events of both are told under that from now on.
 
-        other: that id, as a tracker of faces had it, or the name of whom it has recognized.
+        The later call corrects the earlier: this person is then no longer who that one said.
+
+        other: that id, as a tracker of faces had it, or the name of whom it has recognized; this person's own id
+            takes back what was said before.
 
         Raises:
-            InputRefused: `other` can be no person's id.
+            InputRefused: `other` can be no person's id: it is no name, the robot's, or a thing's of the world.
         """
         self._check()
-        if not keys.is_chunk(taken(other, str, f"{self.id}: same_as")) or other in (self.id, self.robot):
-            raise InputRefused(Fault(reason=f"{other!r} can't be another id of {self.id!r}", where=self.id))
+        thing = self._entity(taken(other, str, f"{self.id}: same_as"))
+        is_thing = other == self.robot or (thing is not None and thing.kind != "person")
+        if is_thing or not keys.is_chunk(other):
+            reason = f"{other!r} can't be another id of {self.id!r}"
+            reason += f": the world has it as of kind {thing.kind!r}" if thing is not None and is_thing else ""
+            raise InputRefused(Fault(reason=reason, where=self.id, advice=ANOTHER_ID))
         self._tell([ActorFound(actor=self.id, at=self._bus.stamp(), same_as=other)])
 
     async def move_to(self, position: Vector) -> None:
@@ -110,7 +117,8 @@ class PerceivedPerson:
             InputRefused: `position` is not a place.
         """
         self._check()
-        self.bring(replace(self._body, position=taken(position, Vector, f"{self.id}: position")))
+        place = taken(position, Vector, f"{self.id}: position")
+        self.bring(replace(self._body, position=place, placeless=False))
 
     def bring(self, *entities: Entity) -> None:
         """Put entities into the world, or change them there: things, hands, the person.
@@ -362,7 +370,7 @@ class PerceivedPerson:
         not_a_thing(self.id, World(entities=self._world.entities))
         if position is not None or self._entity(self.id) is None:
             place = position or free_seat([each.position for each in self._world.entities if each.kind == "person"])
-            self._own[self.id] = Entity(id=self.id, kind="person", position=place)
+            self._own[self.id] = Entity(id=self.id, kind="person", position=place, placeless=position is None)
             self._own[f"{self.id}-hand"] = Entity(
                 id=f"{self.id}-hand", kind="hand", owner=self.id, position=_sum(place, LAP)
             )  # fmt: skip

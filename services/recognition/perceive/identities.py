@@ -9,8 +9,8 @@ that id as they come in, and what is told gets the person's name as it goes out.
 `face_3` turns out to be `ann` goes on as it is, and is told as ann's from then on.
 
 Two ids are one person if perception says so (`ActorFound.same_as`), or if the second is first seen where the first
-was lost. That is a guess. It ends as soon as both are seen, or perception says that the second is somebody else:
-what is told from then on of the second is told by its own id.
+was lost. That is a guess, and ends as soon as both are seen. Each id is another of one at most: what perception says
+later of it corrects what it said, or what was guessed. From then on the two are two people again, each by its own id.
 """
 
 import math
@@ -43,13 +43,21 @@ class Join(NamedTuple):
     newer: str
     former: str
     name: str
+    before: str
+    """The id by which the person of the newer id was told of until now."""
 
 
 class Parting(NamedTuple):
-    """An id that was taken for somebody else's is of a person of its own. name: by which it was told of."""
+    """An id that was taken for somebody else's is of a person of its own. name: by which it was told of.
+
+    leaving: the ids of those of the two whom recognition knows by another id from now on: by `new` instead of `old`.
+    """
 
     id: str
     name: str
+    leaving: frozenset[str]
+    old: str
+    new: str
 
 
 class _Sighting(Struct):
@@ -78,58 +86,58 @@ class Identities:
         self._robot = robot
         self._inside: dict[str, str] = {}
         """The id by which recognition knows a person, by each other id of this person. The longest known first."""
-        self._names: dict[str, str] = {}
-        """The id by which a person is told of, where recognition knows them by another."""
+        self._same: dict[str, str] = {}
+        """The id of the same person of which each was said, or guessed, to be another; never in a circle."""
         self._guessed: dict[str, frozenset[str]] = {}
         """Ids that were joined by their place, each with those that the person had before."""
         self._apart: Latest[str, None] = Latest(IDS_KEPT)
-        """Ids that were joined so by mistake."""
+        """Ids that were joined by mistake."""
         self._seen: Latest[str, _Sighting] = Latest(IDS_KEPT)
+        self.things: frozenset[str] = frozenset()
+        """Ids of what is in the world and no person."""
 
     def inside(self, id: str) -> str:
         """Return the id by which recognition knows a person. id: as perception tells it, or as it was told."""
         return self._inside.get(id, id)
 
     def name(self, id: str) -> str:
-        """Return the id by which a person is told of. id: by which recognition knows them."""
-        return self._names.get(id, id)
+        """Return the id by which a person is told of. id: any of theirs."""
+        while id in self._same:
+            id = self._same[id]
+        return id
 
     def inward(self, message: AnyStruct) -> AnyStruct:
         return renamed(message, self.inside) if self._inside else message
 
     def outward(self, message: AnyStruct) -> AnyStruct:
-        return renamed(message, self.name) if self._names else message
+        return renamed(message, self.name) if self._same else message
 
-    def join(self, kept: str, other: str, name: str) -> None:
+    def join(self, kept: str, other: str) -> None:
         """Take two ids by which recognition knows people for one. kept: the one by which it goes on to do so."""
-        for id, inside in tuple(self._inside.items()):
-            if inside == other:
-                self._inside[id] = kept
-        self._inside |= {id: kept for id in (other, name) if id != kept}
+        for id in self._all(other) - {kept}:
+            self._inside[id] = kept
         self._inside.pop(kept, None)
-        self._names |= {kept: name, other: name}
-        oldest = [id for id, inside in self._inside.items() if self.name(inside) != id]
+        oldest = [id for id in self._same if id in self._inside]
         for id in oldest[: max(0, len(self._inside) - IDS_KEPT)]:
+            former = self._same[id]
+            self._same |= {later: former for later, one in self._same.items() if one == id}
             self._drop(id)
 
     def others(self) -> tuple[SamePerson, ...]:
         """All ids by which people are not told of."""
-        ids = {**self._inside, **{id: id for id in self._names if id not in self._inside}}
-        people = [(id, self.name(inside)) for id, inside in ids.items()]
-        return tuple(
-            SamePerson(actor=id, name=name, is_guess=id in self._guessed) for id, name in people if id != name
-        )
+        return tuple(SamePerson(actor=id, name=self.name(id), is_guess=id in self._guessed) for id in self._same)
 
     def resume(self, people: tuple[SamePerson, ...]) -> None:
         """Go on with the ids that a former life has told of."""
         for actor, name, is_guess in ((each.actor, each.name, each.is_guess) for each in people):
             if is_guess:
                 self._guessed[actor] = self._all(name)
-            self.join(name, actor, name)
+            self._same[actor] = name
+            self.join(name, actor)
 
     def _all(self, inside: str) -> frozenset[str]:
         """All ids of a person."""
-        return frozenset({inside, self.name(inside), *(id for id, at in self._inside.items() if at == inside)})
+        return frozenset({inside, *(id for id, at in self._inside.items() if at == inside)})
 
     def is_other(self, id: str) -> bool:
         """True of an id by which recognition knew somebody whom it knows by another now."""
@@ -146,30 +154,31 @@ class Identities:
 
     def _drop(self, id: str) -> None:
         self._inside.pop(id, None)
-        self._names.pop(id, None)
+        self._same.pop(id, None)
         self._guessed.pop(id, None)
 
+    def _is_of(self, id: str, other: str) -> bool:
+        """True if an id is this other one, or has come to its person by it."""
+        while id != other and id in self._same:
+            id = self._same[id]
+        return id == other
+
     def _part(self, id: str) -> Parting:
-        """Take an id that was joined by its place for one of a person of its own; ids that came later are of it, too.
+        """Take an id that was joined for one of a person of its own; those that are joined by it are of it, too.
 
         Recognition knows the person by the same id as before: who that is tells what is open with them.
         """
-        inside, everybody = self.inside(id), self._all(self.inside(id))
-        name, former = self.name(inside), self._guessed.pop(id) & everybody
-        own = everybody - former
+        inside, name = self.inside(id), self.name(id)
+        everybody = self._all(inside)
+        own = frozenset(each for each in everybody if self._is_of(each, id))
+        del self._same[id]
+        self._guessed.pop(id, None)
         self._apart[id] = None
-        if inside in former:
-            leaving, head, told = own, id, id
-        else:
-            leaving, head, told = former, name, name
-            self._names.pop(inside, None)
-            if inside != id:
-                self._names[inside] = id
+        leaving, new = (everybody - own, name) if inside in own else (own, id)
         for each in leaving:
             self._inside.pop(each, None)
-            self._names.pop(each, None)
-        self._inside |= {each: head for each in leaving if each != head}
-        return Parting(id, told)
+        self._inside |= {each: new for each in leaving if each != new}
+        return Parting(id, name, leaving, inside, new)
 
     # -- what perception tells ----------------------------------------------------------------------------------
 
@@ -181,36 +190,47 @@ class Identities:
                 parted = self._see(actor, at)
                 self._seen[actor].found = True
                 return [*told, *parted]
-            case ActorLost(actor=actor) if actor in self._seen:
-                self._seen[actor].lost, self._seen[actor].found = at, False
+            case ActorLost(actor=actor, left=has_left) if (lost := self._seen.get(actor)) is not None:
+                lost.lost, lost.found = at, False
+                lost.place = None if has_left else lost.place
             case HeadPose(actor=actor, position=place):
                 return self._place(actor, place, at)
-            case World(people=people):
+            case World(people=people, entities=entities):
+                self.things = frozenset(entity.id for entity in entities if entity.kind != "person")
                 there = {person.id for person in people}
                 for id, seen in self._seen.items():
                     if seen.in_world and id not in there:
                         seen.in_world = False
                         seen.lost = at if seen.lost is None and not seen.found else seen.lost
-                changes = [change for person in people for change in self._place(person.id, person.position, at)]
+                placed = ((each.id, None if each.placeless else each.position) for each in people)
+                changes = [change for id, place in placed for change in self._place(id, place, at)]
                 for id in there & self._seen.keys():
                     self._seen[id].in_world = True
                 return changes
         return []
 
     def _told(self, actor: str, former: str) -> list[Join | Parting]:
-        """Take the word of perception that an id is somebody's who has another."""
-        changes: list[Join | Parting] = []
-        newer, known = self.inside(actor), self.inside(former)
-        for id in {actor, former} & self._guessed.keys():
-            if newer == known:
-                del self._guessed[id]  # it was right
-            elif id == actor:
-                changes.append(self._part(id))
-        newer, known = self.inside(actor), self.inside(former)
-        name = former if newer == known else self.name(known)
-        if newer != known or self.name(known) != name:
-            changes.append(Join(newer, known, name))
+        """Take the word of perception that an id is somebody's who has another, or, by its own id, nobody else's."""
+        newer, known, before = self.inside(actor), self.inside(former), self.name(actor)
+        if newer == known and actor != former:
+            for id in (actor, former):
+                self._guessed.pop(id, None)  # it was right
+            if self._is_of(former, actor):  # which of the two is the other's is said the other way round
+                del self._same[former]
+                if actor in self._same:
+                    self._same[former] = self._same[actor]
+            self._same[actor] = former
+            name = self.name(actor)
+            return [Join(newer, known, name, before)] if name != before else []
+        changes: list[Join | Parting] = [self._part(actor)] if actor in self._same else []
+        if actor != former:
+            changes.append(self._joined(actor, former))
         return changes
+
+    def _joined(self, id: str, former: str) -> Join:
+        """Take an id that has come to nobody for another of a person."""
+        self._same[id] = former
+        return Join(self.inside(id), self.inside(former), self.name(former), id)
 
     def _see(self, id: str, at: Seconds) -> list[Join | Parting]:
         """Take a sign of an id. Returns who is somebody else after all: both are there."""
@@ -224,8 +244,8 @@ class Identities:
         return [
             self._part(guessed)
             for guessed, former in tuple(self._guessed.items())
-            if (id == guessed and any(self._is_with(each, before) for each in former))
-            or (id in former and self._is_with(guessed, before))
+            if (id == guessed and any(self._is_with(each, before) for each in former & self._all(self.inside(id))))
+            or (id in former and self.inside(id) == self.inside(guessed) and self._is_with(guessed, before))
         ]
 
     def _is_with(self, id: str, before: Seconds) -> bool:
@@ -233,23 +253,25 @@ class Identities:
         seen = self._seen.get(id)
         return seen is not None and seen.lost is None and (seen.found or seen.in_world or seen.at >= before)
 
-    def _place(self, id: str, place: Vector, at: Seconds) -> list[Join | Parting]:
-        """Take where an id is. Returns whose it is, too, if it is new."""
+    def _place(self, id: str, place: Vector | None, at: Seconds) -> list[Join | Parting]:
+        """Take where an id is; None: nobody knows. Returns whose it is, too, if it is new."""
         if id == self._robot:
             return []
         parted, seen = self._see(id, at), self._seen[id]
         is_new, seen.place = seen.place is None and at <= seen.since + PLACED_WITHIN, place
-        if not is_new or id in self._inside or id in self._names or id in self._apart:
+        if place is None or not is_new or id in {*self._same, *self._same.values(), *self._apart}:
             return parted
         lost = [
-            other for other, one in self._seen.items() if other != id and self._is_lost_at(one, place, seen.since)
+            (one.lost_at(seen.since) or 0.0, other)
+            for other, one in self._seen.items()
+            if other != id and self._is_lost_at(one, place, seen.since)
         ]
-        known = {self.inside(other) for other in lost} - {id}
+        known = {self.inside(other) for _, other in lost} - {id}
         if len(known) != 1:
             return parted
         former = known.pop()
         self._guessed[id] = self._all(former)
-        return [*parted, Join(id, former, self.name(former))]
+        return [*parted, self._joined(id, max(lost)[1])]
 
     def _is_lost_at(self, one: _Sighting, place: Vector, at: Seconds) -> bool:
         """True if this one was lost by `at`, not long before, and near this place."""
