@@ -151,9 +151,8 @@ def test_who_has_left_is_disengaged_in_time_and_comes_back_as_the_same_person():
     told.happens(event("dg-2", "started", 3600.0))
     told.until(3605.0)
 
-    assert [level for _, level in told.levels] == ["engaging", "engaged", "disengaging", "disengaged"] + [
-        "engaging", "engaged",
-    ]  # fmt: skip
+    assert [level for _, level in told.levels[:4]] == ["engaging", "engaged", "disengaging", "disengaged"]
+    assert told.levels[4:] == [(3600.0, "engaging"), (3601.5, "engaged")]
     assert told.messages[-1].session.events == 2
 
 
