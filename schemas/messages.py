@@ -143,7 +143,8 @@ def _decoder_of(encoding: str) -> "msgspec.msgpack.Decoder[Any] | msgspec.json.D
 
 
 LineMessage = (
-    recognition.ConnectionEvent | recognition.Statistics | perception.Utterance | Fault
+    recognition.ConnectionEvent | recognition.Interjection | recognition.Floor | recognition.Statistics
+    | perception.Utterance | Fault
     | fragments.HeadOwner | fragments.StudyCondition | body_faults.BodyFaults
     | Feedback | blocks.Held | blocks.BodyHeld | blocks.NetPlanned | blocks.NetMarked | blocks.NetWaiting
 )  # fmt: skip

@@ -12,6 +12,7 @@ from engage_hri.schemas.body import AbortBehavior
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.turns.interjections import WORDLESS
 from engage_hri.services.requests.ends import RequestRefused
 from tests.commanding import command
 from tests.generation.robots import Robot, robot, says, shows
@@ -269,10 +270,10 @@ async def test_a_barge_in_ends_all_of_the_turn_at_whatever_moment(stage: Robot, 
     stage.does("speak")
     await asyncio.sleep(5.0)
 
-    assert stage.reached["b:end"] >= at + 0.8
+    assert stage.reached["b:end"] >= at + WORDLESS
     assert [(closed.status, closed.reason) for _, closed in stage.closed] == [("aborted", "human took the floor")]
     assert stage.outcomes["c"][1].status == "interrupted"
-    assert stage.outcomes["c"][0] == round(at + 0.8, 6)
+    assert stage.outcomes["c"][0] == round(at + WORDLESS, 6)
     assert "c:s:start" not in stage.reached
 
 
@@ -282,7 +283,7 @@ async def test_who_speaks_while_the_robot_pauses_takes_the_floor(stage: Robot) -
     stage.does("speak")
     await asyncio.sleep(3.0)
 
-    assert [(round(at, 6), closed.reason) for at, closed in stage.closed] == [(2.3, "human took the floor")]
+    assert [(round(at, 6), closed.reason) for at, closed in stage.closed] == [(3.0, "human took the floor")]
 
 
 async def test_an_answer_that_goes_on_into_the_next_turn_is_no_barge_in(stage: Robot) -> None:

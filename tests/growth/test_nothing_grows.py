@@ -16,7 +16,7 @@ from engage_hri.services.console.view import UTTERANCES_KEPT as UTTERANCES_SHOWN
 from engage_hri.services.generation.turns.outcomes import MOST as WORDS_KEPT
 from engage_hri.services.generation.turns.outcomes import PEOPLE
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT
-from engage_hri.services.recognition.events.machine import TEXTS_KEPT
+from engage_hri.services.recognition.events.machine import INTERJECTIONS_KEPT, TEXTS_KEPT
 from engage_hri.services.recognition.events.session import ACTIONS_KEPT, TURNS_KEPT
 from engage_hri.services.recognition.perceive.clock_errors import PEOPLE_KEPT
 from engage_hri.services.recognition.perceive.clock_restarts import REPORTERS_KEPT
@@ -32,6 +32,7 @@ LIMITS = {
     "_carriers": KEYS_KEPT, "_wanting": KEYS_KEPT, "_used": NAMES_KEPT, "_told": UTTERANCES_KEPT, "_told_of": PEOPLE,
     "_said": WORDS_KEPT, "_errors": PEOPLE_KEPT + 1, "_ended_turns": TURNS_KEPT, "_aborted_turns": TURNS_KEPT,
     "_performed": ACTIONS_KEPT, "_texts": TEXTS_KEPT, "_spoken": TEXTS_KEPT, "_points": BLOCKS_KEPT,
+    "_interjected": INTERJECTIONS_KEPT,
     "events": EVENTS_KEPT, "said": UTTERANCES_SHOWN, "warned": WARNINGS_KEPT, "_encoded[*][*]": 2**20,
     "_channel_ids": MOST_CHANNELS, "channel_message_counts": MOST_CHANNELS,
     "_clocks": REPORTERS_KEPT, "_addressed": BLOCKS_KEPT, "_indices": FULL_CHUNK // 31, "records": FULL_CHUNK // 31,

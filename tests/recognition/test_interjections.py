@@ -26,7 +26,7 @@ class Said(NamedTuple):
 
 
 def told(*speeches: Said, worded: bool, end: float = TURN[1]) -> list[tuple[float, str, float]]:
-    """Each change: start of the speech, reading, and when it was told. worded: words of the person came before."""
+    """Each new reading: start of the speech, reading, and when it was told. worded: words came before."""
     log, changes = Log(adjacency_pair_limit=4.0), []
     if worded:
         log.begins(HUMAN, "speak", 0.1)
@@ -53,9 +53,13 @@ def told(*speeches: Said, worded: bool, end: float = TURN[1]) -> list[tuple[floa
         seen = len(log.effects)
         step()
         changes += [(each, at) for each in log.effects[seen:]]
-    return [
-        (each.since.seconds, each.reading, round(at, 6)) for each, at in changes if isinstance(each, Interjection)
-    ]
+    readings: dict[float, str] = {}
+    found = []
+    for each, at in changes:
+        if isinstance(each, Interjection) and readings.get(each.since.seconds) != each.reading:
+            readings[each.since.seconds] = each.reading
+            found.append((each.since.seconds, each.reading, round(at, 6)))
+    return found
 
 
 CASES = [

@@ -72,7 +72,9 @@ class Interjections:
                 if after == 0.0:
                     self._heed(kept, now)
             return False
-        kept.told = told
+        before, kept.told = kept.told.reading, told
+        if told.reading == before == "interruption" and not (kept.went_on or kept.waits):
+            return False  # it has the floor, and only its words are new
         takes_floor = told.reading == "interruption" and kept.turn == turn and kept.is_heeded
         if takes_floor and not kept.lasts(now):
             kept.waits = True  # it may be a laugh, or its words may come

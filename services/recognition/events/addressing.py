@@ -31,6 +31,8 @@ JUST_SPOKEN: Seconds = 6.0
 (`recognition.adjacency_pair_limit`)."""
 SHORT_CALL = 3
 """Number of words up to which a name at the end calls somebody. Ours."""
+MARKS = ".,!?;:…¡¿\"'“”„‘’«»、。！？"
+"""Punctuation that may stand beside a name."""
 Addressees = frozenset[str]
 NOBODY: Addressees = frozenset()
 WHOEVER: Addressees = frozenset(("",))
@@ -92,11 +94,11 @@ def named(words: str, names: Mapping[str, str]) -> Addressees:
     A name calls somebody if it stands first, last after a comma, or last of a few words: "hello robot". In the
     middle, and at the end of a sentence, it may be what the sentence is about.
     """
-    said = words.split()
+    said = [word for word in words.split() if any(map(str.isalnum, word))]
     calls = said[:1]
     if len(said) > 1 and (len(said) <= SHORT_CALL or said[-2].endswith(",")):
         calls = [said[0], said[-1]]
-    plain = [word.strip(".,!?;:…").casefold() for word in calls]
+    plain = [word.strip(MARKS).casefold() for word in calls]
     return frozenset(names[each] for each in plain if each in names)
 
 

@@ -93,6 +93,8 @@ class Conversation:
             pair.person_gone(at, until)
         if self._sign is not None and not self._sign.speeches:
             self._was_backchannel(self._sign, until)
+        for speech in self._sign.speeches if self._sign is not None else ():
+            self._tell_listening(speech, at)
         self._sign = None
         self.robot_backchannel.person_gone(at, until)
         self.speaks_since = None
@@ -170,6 +172,7 @@ class Conversation:
         if self._sign is None:
             self._sign = ListenerSign([])
         self._sign.parts.append(part)
+        self._sign.is_wordless = False  # this one's words may come
 
     @property
     def _sign_deadline(self) -> Seconds | None:
@@ -212,16 +215,23 @@ class Conversation:
             return  # a point in the robot's turn directs the gaze, and says nothing
         event = self._backchannel(self._scene.robot, self.id, sign.since, sign.confidence)
         for speech in sign.speeches:
-            is_noise = self._scene.is_worded and not says_words(self._writer.text_of(self.id, speech.since))
-            self._writer.interject(self.id, speech.since, "noise" if is_noise else "backchannel", until)
+            self._tell_listening(speech, until)
         if sign.speeches:
             event.spoken = tuple(SpeechStart(self.id, speech.since) for speech in sign.speeches)
             self._brief = sign.speeches[-1].since, sign.speeches[-1].until
         self.own_backchannel.speaks(event)
         self.own_backchannel.ends(until)
 
+    def _tell_listening(self, speech: SignPart, at: Seconds) -> None:
+        """Tell that a speech was a listener's, or noise where its words would have come."""
+        is_noise = self._scene.is_worded and not says_words(self._writer.text_of(self.id, speech.since))
+        self._writer.interject(self.id, speech.since, "noise" if is_noise else "backchannel", at)
+
     def _answers(self, part: SignPart, at: Seconds, reading: InterjectionReading = "interruption") -> None:
-        """Take a part of the sign as a turn of the person since it began."""
+        """Take a part of the sign as a turn of the person since it began. Speech before it was a listener's."""
+        for speech in self._sign.speeches if self._sign is not None else ():
+            if speech.since < part.since:
+                self._tell_listening(speech, at)
         self._sign = None
         if part.action == "speak":
             self._writer.interject(self.id, part.since, reading, at)

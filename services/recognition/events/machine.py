@@ -44,6 +44,8 @@ class Mishap(NamedTuple):
 
 TEXTS_KEPT = 64
 """Number of speeches whose words, and of events with speech, that are remembered."""
+INTERJECTIONS_KEPT = 16
+"""Number of interjections that are remembered, to be told again when their words become known."""
 Effect = ConnectionEvent | Interjection | EventOutcome | TurnOutcome | Accepted | Refused | PersonForgotten | Mishap
 IDLE = "idle"
 DECISIONS: frozenset[EventState] = frozenset({"succeeded", "failed", "preempted", "withdrawn", "superseded"})
@@ -136,6 +138,8 @@ class EventWriter:
         self._words_patience = words_patience
         self._texts: Latest[SpeechStart, str] = Latest(TEXTS_KEPT)
         """Words of speeches."""
+        self._interjected: Latest[SpeechStart, Interjection] = Latest(INTERJECTIONS_KEPT)
+        """What people have said into the robot's turns, as it was last told."""
         self._spoken: Latest[str, tuple[OngoingEvent, ConnectionEvent]] = Latest(TEXTS_KEPT)
         """Events with speech of a person, each as it was last told."""
         self.answered: list[tuple[OngoingEvent, Seconds]] = []
@@ -195,10 +199,19 @@ class EventWriter:
             event.request = ""
 
     def interject(self, person: str, speech: Seconds, reading: InterjectionReading, at: Seconds) -> None:
-        """Tell what somebody says into the robot's turn. speech: its start."""
+        """Tell what somebody says into the robot's turn; that it begins, once. speech: its start."""
+        if reading == "open" and SpeechStart(person, speech) in self._interjected:
+            return
         words, stamp = self.text_of(person, speech), self.stamp
         told = Interjection(actor=person, since=stamp(speech), at=stamp(at), reading=reading, words=words)
+        self._interjected[SpeechStart(person, speech)] = told
         self.effects.append(told)
+
+    def interject_again(self, person: str, speech: Seconds, at: Seconds) -> None:
+        """Tell once more what somebody has said into the robot's turn if its words are others by now."""
+        told, words = self._interjected.get(SpeechStart(person, speech)), self.text_of(person, speech)
+        if told is not None and words != told.words:
+            self.interject(person, speech, told.reading, max(at, told.at.seconds))
 
     def understand(self, person: str, speech: Seconds, text: str, at: Seconds) -> None:
         """Take the words of a speech, known at `at`. Events that consist of it are told again if they have others."""

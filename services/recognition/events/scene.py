@@ -204,6 +204,7 @@ class SessionScene:
     def forget_person(self, person: str) -> None:
         self.present.discard(person)
         self.found.discard(person)
+        self.unknown.pop(person, None)
         self.names = {name: id for name, id in self.names.items() if id != person}
 
     def join(self, other: str, kept: str) -> None:

@@ -30,7 +30,7 @@ from engage_hri.services.recognition.events.machine import Effect, EventWriter, 
 from engage_hri.services.recognition.events.people import People
 from engage_hri.services.recognition.events.person import PersonRecognition
 from engage_hri.services.recognition.events.scene import Covered, SessionScene, Worded
-from engage_hri.services.recognition.events.talk import Step
+from engage_hri.services.recognition.events.talk import LONGEST_UNKNOWN, LONGEST_UNTOLD, Step
 from engage_hri.services.reports.ongoing_actions import GoesOn
 
 WORDS_PATIENCE: Seconds = 10.0
@@ -348,6 +348,7 @@ class Session:
             self._people.apply(
                 words.actor, at, lambda person: person.talk.understand(words.since, words.text, words.to, at)
             )
+        self._writer.interject_again(words.actor, words.since, at)
 
     def _robot_is_heard(self, is_speaking: bool, at: Seconds) -> None:
         """End speech with a lost end: the body showed that it speaks, and for `SILENCE` no longer does."""
@@ -429,7 +430,8 @@ class Session:
         """Longest time from the robot's last deed to the decision, also if the turn's end or anchors never come."""
         offsets = [found[1] for text in wanted.anchors if (found := anchor(text)) is not None]
         limit = max(event.limit or 0.0, self._config.backchannel_limit)
-        return limit + TURN_PATIENCE + max([0.0, *offsets]) + SETTLING
+        unknown = LONGEST_UNTOLD if self.scene.tells_addressees else LONGEST_UNKNOWN if self.in_company else 0.0
+        return limit + TURN_PATIENCE + max([0.0, *offsets]) + unknown + SETTLING
 
     def _clock(self, event: OngoingEvent, wanted: Event) -> LimitClock | None:
         """Clock of the event's limit; None: it has none."""
@@ -476,10 +478,9 @@ class Session:
         event = self._live.pop(cancel.id, None)
         if event is not None and event.request == cancel.id:
             is_orphan = cancel.cause in ORPHANING
+            who = event.initiator if event.responder == self.robot else event.responder
             self._people.apply(
-                event.responder,
-                at,
-                lambda person: person.recognizer(event.kind).withdraw(event, at, is_orphan=is_orphan),
+                who, at, lambda person: person.recognizer(event.kind).withdraw(event, at, is_orphan=is_orphan)
             )
 
     # -- turns and blocks ---------------------------------------------------------------------------------------

@@ -31,10 +31,11 @@ from engage_hri.services.text.listening import says_words
 LONGEST_UNKNOWN: Seconds = 3.0
 """Time after which it is decided to whom a speech is that still goes on, by the looks so far. Ours."""
 ADDRESSEES_WAIT: Seconds = 1.0
-"""Time after a speech for which perception is waited for that tells to whom people speak. Ours."""
-LONGEST_UNTOLD: Seconds = 60.0
+"""Time after a speech for which its words are waited for, where perception tells words: they may call somebody by
+name, and perception may say to whom they are. Ours."""
+LONGEST_UNTOLD: Seconds = 15.0
 """As `LONGEST_UNKNOWN`, where perception tells addressees: it may do so only with the words, when the speech is over.
-No speech is longer (`LONGEST_SPEECH`). Ours."""
+A question of the robot waits so long, at most, until it is known that what somebody else says is no answer. Ours."""
 Step = Callable[[Conversation], object]
 
 
@@ -109,7 +110,7 @@ class Talk(KindRecognizer):
         longest = speech.since + (LONGEST_UNTOLD if self._scene.tells_addressees else LONGEST_UNKNOWN)
         if speech.until is None:
             return longest
-        return min(longest, speech.until + (ADDRESSEES_WAIT if self._scene.tells_addressees else 0.0))
+        return min(longest, speech.until + (ADDRESSEES_WAIT if self._scene.is_worded else 0.0))
 
     # -- the person ---------------------------------------------------------------------------------------------
 
@@ -138,9 +139,11 @@ class Talk(KindRecognizer):
     def _speaks(self, at: Seconds, confidence: Probability, face: str) -> None:
         """Take the beginning of a speech. face: whose face the person looks at."""
         self._speech = speech = self._own_speech(at, confidence, face)
-        speech.told = self._scene.told_to(self.id, at)
-        self._find(speech, face, at)
-        if self._conversation.robot_holds_floor:
+        speech.told, speech.words = self._scene.told_to(self.id, at), self._writer.text_of(self.id, at)
+        # What waits in line may be the robot's own turn, so that only the scene knows that it has begun.
+        is_into_turn = self._conversation.robot_holds_floor or (self._line and self._scene.robot_speaks_to(self.id))
+        is_known = self._find(speech, face, at)
+        if is_into_turn and (not is_known or speech.is_to(self._scene.robot)):
             self._writer.interject(self.id, at, "open", at)
             speech.is_interjected = True
         self._queue(at, speech)
