@@ -29,9 +29,10 @@ def test_the_person_spoken_to_goes_before_the_one_who_is_nearer() -> None:
         for id, place in [("near", (1.0, 0.0, 1.2)), ("far", (3.0, 0.0, 1.2))]
     )
     stage.feed(World(entities=people))
+    stage.until(1.0)
     stage.do(lambda arbiter: arbiter.speak_to("far"))
 
-    assert stage.owners == [(0.0, "face", "near"), (0.0, "face", "far")]
+    assert stage.owners == [(0.0, "face", "near"), (1.0, "face", "far")]
 
 
 # -- whatever happens ---------------------------------------------------------------------------------------------

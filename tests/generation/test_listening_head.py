@@ -126,8 +126,8 @@ def test_who_speaks_to_the_robot_has_its_eyes_and_not_who_talks_on_or_looks_at_i
     assert looks(stage)[2:] == [(15.0, "cup")], "what somebody points at may be what is spoken of"
     stage.feed(event("point", "failed", initiator="cem", objects=("cup",)))
     stage.feed(Floor(at=AT, speeches=()))
-    stage.until(15.5)
-    assert looks(stage)[3:] == [(15.0, "ann"), (15.0, "cem")]
+    stage.until(16.0)
+    assert looks(stage)[3:] == [(15.0, "ann"), (15.8, "cem")]
 
 
 def asked_all(stage: Stage, state: str, **fields: object) -> None:
@@ -147,11 +147,11 @@ def test_while_several_are_to_answer_it_looks_from_one_to_the_next_until_one_spe
     stage.until(18.0)
     assert looks(stage) == [(14.0, "ben"), (15.2, "cem"), (16.4, "ann"), (17.6, "ben")]
 
-    speak(stage, 18.0, "cem")
+    speak(stage, 18.5, "cem")
     asked_all(stage, "succeeded", answered_by="cem")
     speak(stage, 20.0)
     stage.until(30.0)
-    assert looks(stage)[4:] == [(18.0, "cem")]
+    assert looks(stage)[4:] == [(18.5, "cem")]
 
 
 def test_who_has_left_is_not_looked_for_in_the_round_and_one_who_is_left_is_looked_at() -> None:
@@ -184,10 +184,10 @@ def test_a_voice_without_a_face_and_one_whose_recognition_has_gone_draw_nobody()
     assert looks(stage) == []
 
     speak(stage, 12.0, "ben")
-    stage.until(13.0)
+    stage.until(14.0)
     stage.do(lambda arbiter: arbiter.recognition_lost())
     stage.until(20.0)
-    assert looks(stage) == [(12.6, "ben"), (13.3, "ann")]
+    assert looks(stage) == [(12.6, "ben"), (14.3, "ann")]
 
 
 def test_who_leaves_while_speaking_holds_the_head_no_longer() -> None:
@@ -213,6 +213,54 @@ def test_an_answer_to_a_look_goes_before_and_an_inhibition_holds_the_head() -> N
 
     assert stage.owners[-1][1:] == ("inhibition", "")
     assert looks(stage) == [(10.6, "ben"), (11.0, "cup"), (11.0, "ben")]
+
+
+def seek_eyes(stage: Stage, who: str, state: str) -> None:
+    stage.feed(event(f"look-{who}", state, kind="mutual_facial_gaze", initiator=who, objects=()))
+
+
+def test_a_look_at_a_face_lasts_though_others_speak_and_look_in_turns() -> None:
+    stage = company()
+    speak(stage, 10.0, "ben")
+    stage.until(10.7)
+    for state in ("started", "failed", "started"):
+        seek_eyes(stage, "cem", state)
+        stage.until(stage.now + 0.1)
+    stage.until(12.0)
+    assert looks(stage) == [(10.6, "ben"), (11.4, "cem")]
+
+    seek_eyes(stage, "cem", "failed")
+    stage.until(12.1)
+    seek_eyes(stage, "ann", "started")
+    seek_eyes(stage, "ann", "failed")
+    stage.until(16.0)
+    assert looks(stage)[2:] == [(12.2, "ben")], "ann's look was over before the head was free"
+
+
+def test_a_brief_look_is_left_for_a_place_and_for_a_fragment() -> None:
+    def brief() -> Stage:
+        stage = company()
+        speak(stage, 10.0, "ben")
+        stage.until(10.7)
+        return stage
+
+    points, gazes = brief(), brief()
+    points.feed(event("e", "started", initiator="cem", objects=("cup",)))
+    assert points.shifts[-1][::2] == (10.7, "cup")
+    gazes.do(lambda arbiter: arbiter.fragment_gazes("cem"))
+    assert gazes.owners[-1] == (10.7, "fragment", "cem")
+
+
+def test_after_a_fragments_brief_look_at_a_face_the_head_stays_there_too() -> None:
+    stage = company()
+    speak(stage, 10.0, "ben")
+    stage.until(12.0)
+    stage.do(lambda arbiter: arbiter.fragment_gazes("cem"))
+    stage.until(12.1)
+    stage.do(lambda arbiter: arbiter.fragment_lets_go())
+    stage.until(14.0)
+
+    assert stage.owners[-2:] == [(12.0, "fragment", "cem"), (12.8, "response", "ben")]
 
 
 def test_it_can_be_switched_off() -> None:

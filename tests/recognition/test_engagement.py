@@ -6,7 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from tests.recognition.test_statistics import event, table_2_1
@@ -24,9 +24,16 @@ class Told:
         self._published = PublishedStatistics("robot", RecognitionConfig(**config))  # type: ignore[arg-type]
         self._busy: set[str] = set()
 
-    def happens(self, *events: ConnectionEvent, at: Seconds | None = None) -> None:
-        self.until(events[0].at.seconds if at is None else at)
-        self._feed(list(events), events[0].at.seconds if at is None else at)
+    def happens(
+        self, *events: ConnectionEvent, at: Seconds | None = None, contact: Probability | None = None
+    ) -> None:
+        now = events[0].at.seconds if at is None else at
+        self.until(now)
+        self._feed(list(events), now, contact)
+
+    def contact(self, at: Seconds, much: Probability) -> None:
+        self.until(at)
+        self._feed([], at, much)
 
     def busy(self, at: Seconds, *persons: str) -> None:
         self.until(at)
@@ -37,8 +44,8 @@ class Told:
         while self._published.deadline is not None and self._published.deadline <= now:
             self._feed([], self._published.deadline)
 
-    def _feed(self, events: list[ConnectionEvent], now: Seconds) -> None:
-        self._published.feed(events, self._busy, now)
+    def _feed(self, events: list[ConnectionEvent], now: Seconds, contact: Probability | None = None) -> None:
+        self._published.feed(events, self._busy, now, {"human": contact})
         self.messages += [statistics for statistics in self._published.told(now) if statistics.actor == self._actor]
 
     @property
@@ -121,8 +128,7 @@ def test_failures_are_forgotten_when_they_leave_the_window():
         told.happens(event(f"dg-{number}", "succeeded", number * 3.0, 0.0))
     forgotten = next(message for message in told.messages if message.at.seconds == 32.0)
 
-    assert told.levels[0] == (0.0, "engaged")
-    assert told.levels[1] == (0.5, "disengaged")
+    assert told.levels[:2] == [(0.0, "engaging"), (0.5, "disengaged")]
     assert "0 of 8 recent events failed" in forgotten.reasons[1]
     assert forgotten.level == "engaged"
 
@@ -131,11 +137,11 @@ def test_whoever_is_busy_freezes_the_estimate_of_all_but_not_of_the_others():
     everybody, bob = Told(""), Told("human")
     for told in (everybody, bob):
         told.happens(event("dg-1", "started", 0.0))
-        told.busy(1.0, "ann")
+        told.busy(2.0, "ann")
         told.until(60.0)
 
-    assert everybody.levels == [(0.0, "engaged")]
-    assert [level for _, level in bob.levels] == ["engaged", "disengaging", "disengaged"]
+    assert everybody.levels == [(0.0, "engaging"), (1.5, "engaged")]
+    assert [level for _, level in bob.levels] == ["engaging", "engaged", "disengaging", "disengaged"]
 
 
 def test_who_has_left_is_disengaged_in_time_and_comes_back_as_the_same_person():
@@ -143,8 +149,10 @@ def test_who_has_left_is_disengaged_in_time_and_comes_back_as_the_same_person():
     told.happens(event("dg-1", "started", 0.0))
     told.until(3600.0)
     told.happens(event("dg-2", "started", 3600.0))
+    told.until(3605.0)
 
-    assert [level for _, level in told.levels] == ["engaged", "disengaging", "disengaged", "engaged"]
+    assert [level for _, level in told.levels[:4]] == ["engaging", "engaged", "disengaging", "disengaged"]
+    assert told.levels[4:] == [(3600.0, "engaging"), (3601.5, "engaged")]
     assert told.messages[-1].session.events == 2
 
 
@@ -163,3 +171,35 @@ def test_optional_failures_lower_nothing():
     told.happens(event("mfg-1", "failed", 0.0, 1.9, optional=True), at=1.9)
 
     assert told.messages[-1].engagement == 1.0
+
+
+def looking(*looks: tuple[Seconds, Seconds], until: Seconds = 12.0) -> list[tuple[float, str]]:
+    """Levels of somebody who looks at the robot from, until these times, each look an event."""
+    told = Told()
+    told.contact(0.0, 0.0)
+    for number, (begin, end) in enumerate(looks):
+        told.happens(event(f"mfg-{number}", "started", begin), contact=1.0)
+        told.contact(end, 0.0)
+    told.until(until)
+    return told.levels[:3]
+
+
+def test_who_comes_is_engaging_before_engaged_also_when_nothing_else_happens():
+    assert looking((3.0, 12.0)) == [(0.0, "disengaged"), (3.0, "engaging"), (4.5, "engaged")]
+
+
+def test_a_first_look_of_all_is_no_engagement_yet():
+    told = Told()
+    told.contact(3.0, 1.0)
+    told.until(8.0)
+
+    assert told.levels == [(3.0, "engaging"), (4.5, "engaged")]
+
+
+def test_a_look_in_passing_engages_nobody():
+    assert looking((3.0, 3.4)) == [(0.0, "disengaged"), (3.0, "engaging")]
+
+
+def test_who_looks_again_is_engaged_if_the_first_look_was_a_while_ago():
+    assert looking((3.0, 3.4), (6.0, 12.0))[2] == (7.0, "engaged"), "the share of contact has grown again"
+    assert looking((3.0, 3.4), (4.0, 12.0))[2] == (4.5, "engaged")

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engage_hri.schemas.recognition import ConnectionEvent, Statistics
+from engage_hri.schemas.recognition import ConnectionEvent, EngagementLevel, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import Effect
 from engage_hri.services.recognition.events.session import Session
 from engage_hri.services.recognition.statistics import published
-from engage_hri.services.recognition.statistics.engagement import JUST_AFTER, next_level
+from engage_hri.services.recognition.statistics.engagement import ENGAGES_AFTER, JUST_AFTER, next_level
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from tests.random_cases import share_of
 from tests.recognition import recomputed
@@ -94,7 +94,8 @@ class Judge:
     def __init__(self, actor: str) -> None:
         self.actor = actor
         self.value: float | None = None
-        self.level = "unknown"
+        self.level: EngagementLevel = "unknown"
+        self._engaging_since = float("-inf")
         self._busy = False
         self._busy_until = float("-inf")
 
@@ -105,16 +106,22 @@ class Judge:
         if not (self._busy and busy):
             value = self.at(replay, now)
             if value is not None:
-                self.value, self.level = value, next_level(self.level, value, CONFIG)
+                before, self.level = self.level, self._level(value, now)
+                self.value = value
+                if self.level == "engaging" != before:
+                    self._engaging_since = now
         self._busy = busy
 
     def at(self, replay: Replay, now: Seconds) -> float | None:
         return recomputed.engagement(recomputed.lives(replay.log, self.actor), now, self._busy_until, CONFIG)
 
-    def foresees(self, replay: Replay, now: Seconds) -> str:
+    def foresees(self, replay: Replay, now: Seconds) -> EngagementLevel:
         """The level at `now` if nothing happens until then."""
         value = self.at(replay, now)
-        return self.level if value is None or self._busy else next_level(self.level, value, CONFIG)
+        return self.level if value is None or self._busy else self._level(value, now)
+
+    def _level(self, value: float, now: Seconds) -> EngagementLevel:
+        return next_level(self.level, value, CONFIG, lasts=now >= self._engaging_since + ENGAGES_AFTER)
 
 
 @settings(max_examples=share_of(25), deadline=None)

@@ -147,17 +147,27 @@ def test_pace_compares_with_the_larger_of_recent_and_open(usual, recent, open, e
     assert pace(usual, recent, open) == expected
 
 
-def test_levels_change_only_beyond_the_margin():
-    config = RecognitionConfig()
+@pytest.mark.parametrize(
+    ("before", "value", "after"),
+    [
+        ("engaged", 0.46, "engaged"), ("engaged", 0.44, "disengaging"), ("engaging", 0.54, "engaging"),
+        ("engaging", 0.56, "engaged"), ("disengaging", 0.21, "disengaging"), ("disengaging", 0.19, "disengaged"),
+        ("disengaged", 0.29, "disengaged"), ("disengaged", 0.31, "engaging"),
+    ],
+)  # fmt: skip
+def test_levels_change_only_beyond_the_margin(before, value, after):
+    assert next_level(before, value, RecognitionConfig(), lasts=True) == after
 
-    assert next_level("unknown", 0.5, config) == "engaged"
-    assert next_level("engaged", 0.46, config) == "engaged"
-    assert next_level("engaged", 0.44, config) == "disengaging"
-    assert next_level("engaging", 0.54, config) == "engaging"
-    assert next_level("disengaging", 0.21, config) == "disengaging"
-    assert next_level("disengaging", 0.19, config) == "disengaged"
-    assert next_level("disengaged", 0.29, config) == "disengaged"
-    assert next_level("disengaged", 0.31, config) == "engaging"
+
+@pytest.mark.parametrize(
+    ("before", "lasts", "after"),
+    [
+        ("unknown", True, "engaging"), ("disengaged", True, "engaging"), ("engaging", False, "engaging"),
+        ("engaging", True, "engaged"), ("disengaging", False, "engaged"), ("engaged", False, "engaged"),
+    ],
+)  # fmt: skip
+def test_nobody_is_engaged_who_was_not_engaging_for_a_while(before, lasts, after):
+    assert next_level(before, 1.0, RecognitionConfig(), lasts=lasts) == after
 
 
 def engagement(starts: list[float], failed: int = 0) -> Engagement:
@@ -181,8 +191,8 @@ def test_silence_weakens_and_then_breaks_engagement_at_foretold_times():
         levels.append(one.update(now, busy=False).level)
         times.append(round(now, 3))
 
-    assert levels == ["engaged", "disengaging", "disengaged"]
-    assert times == [round(5.7 + 5.7 / 0.45 + 0.001, 3), round(5.7 + 5.7 / 0.2 + 0.001, 3)]
+    assert levels == ["engaging", "engaged", "disengaging", "disengaged"]
+    assert times == [7.2, round(5.7 + 5.7 / 0.45 + 0.001, 3), round(5.7 + 5.7 / 0.2 + 0.001, 3)]
 
 
 def test_failures_lower_the_estimate_and_are_named():
@@ -222,7 +232,9 @@ def test_statistics_are_published_again_when_time_changes_them_and_then_fall_sil
         now = published.deadline
         seen += [(round(now, 2), one.level, one.recent.events) for one in published.told(now) if one.actor]
 
-    assert seen == [(13.67, "disengaging", 1), (29.5, "disengaged", 1), (31.0, "disengaged", 0)]
+    assert seen == [
+        (2.5, "engaged", 1), (13.67, "disengaging", 1), (29.5, "disengaged", 1), (31.0, "disengaged", 0)
+    ]  # fmt: skip
 
 
 def test_statistics_are_published_when_somebody_gets_busy():

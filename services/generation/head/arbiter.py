@@ -1,6 +1,7 @@
 """Arbiter of the robot's head: six claims by priority, one owner at a time. Thesis 3.3.4.
 
 A higher claim takes over at once; when the owner lets go the head stays for a dwell before a lower claim gets it.
+From a face that it has just gone to it goes to another one by a higher claim than those of the people (4 to 6) only.
 Claims 3 to 6 move the base gaze by `gazeShift` blocks, which end on arrival and hold nothing. A fragment's own gaze
 lies over the base gaze: while it owns the head no shift is sent, with two exceptions. While that gaze is on a face
 the base gaze goes there, too, unseen: at the end of a turn the head must not fall back to where it was before. And
@@ -28,6 +29,10 @@ from engage_hri.services.reports.same_people import renamed
 DWELL: Seconds = 0.3
 """Time that the head stays after its owner let go, before a lower claim gets it: a claim that comes back at once
 finds it there. Ours."""
+LEAST_LOOK: Seconds = 0.8
+"""Time for which a look at a face lasts at least before a claim from response down takes the head to another face: of
+several people who speak and look, the claims change faster than a head may. People's looks at who speaks last about a
+second. Ours."""
 RETRY: Seconds = 1.0
 """Pause before a gaze shift that failed is tried again, so that a body that cannot is not asked
 all the time. Ours."""
@@ -112,6 +117,9 @@ class Arbiter:
         """Claims without the head; None before the first ruling, so that this counts as changed."""
         self._lapsed: Seconds | None = None
         """Time when the owner let go, while the head still dwells on its target."""
+        self._looks_since: Seconds = 0.0
+        self._stays_until: Seconds | None = None
+        """Time until which the head stays on a face though another one is to be looked at."""
         self._base = NOWHERE
         """Place to which the base gaze was last sent."""
         self._held = NOWHERE
@@ -229,7 +237,9 @@ class Arbiter:
     def deadline(self) -> Seconds | None:
         due = [each.deadline for each in (self._hands, self._faces, self._glances, self._responses, self._listening)]
         due.append(self._failed[1] if self._failed else None)
-        if self._lapsed is not None:
+        if self._stays_until is not None:
+            due.append(self._stays_until)
+        elif self._lapsed is not None:
             due.append(self._lapsed + DWELL)
         return min((each for each in due if each is not None), default=None)
 
@@ -243,6 +253,8 @@ class Arbiter:
         if waited is None:
             self._since = now
         self._owner = self._next_owner(claims, now)
+        if self._owner.target != before.target:
+            self._looks_since = now
         if self._owner != before:
             self._lapsed = None
             arrives = self._owner.kind == "inhibition" != before.kind
@@ -277,6 +289,14 @@ class Arbiter:
         return self._owner.target or (self._state.looking_at if self._state else "") or self._base.target
 
     def _next_owner(self, claims: list[Claim], now: Seconds) -> Claim:
+        """The claim that gets the head, or still the owner while its look at a face is too short."""
+        wanted, ends = self._strongest(claims, now), self._looks_since + LEAST_LOOK
+        faces = {self._owner.target, wanted.target}
+        is_brief = now < ends and len(faces) == 2 and faces <= {*self._faces.present(now)}
+        self._stays_until = ends if is_brief and wanted.kind in ("response", "face") else None
+        return wanted if self._stays_until is None else self._owner
+
+    def _strongest(self, claims: list[Claim], now: Seconds) -> Claim:
         best = claims[0] if claims else NOBODY
         own = next((claim for claim in claims if claim.kind == self._owner.kind), None)
         if self._owner is NOBODY or (claims and best.priority < self._owner.priority):

@@ -7,7 +7,8 @@ person's (decision 0198). Silence is only that in which there is no contact eith
 nothing for a minute. While the person is busy with a task nothing is concluded from silence: that explains the 70 s
 gap of the canapé study. The estimate is the mean of the two, or the one that is known.
 
-The levels are those of ROS4HRI: a person becomes engaged and leaves again by way of `engaging` and `disengaging`.
+The levels are those of ROS4HRI: at the first sign of contact a person is `engaging`, and `engaged` only if they are
+still, or again, in contact a while later; who drifts away is `disengaging` first.
 """
 
 from typing import Literal, NamedTuple
@@ -23,6 +24,9 @@ ENOUGH_EVENTS = 5
 events. Ours."""
 JUST_AFTER: Seconds = 0.001
 """Delay after the instant at which the estimate is on a threshold; then it has passed it."""
+ENGAGES_AFTER: Seconds = 1.5
+"""Time from the first sign of contact after which who is in contact is engaged: who only looks in passing has looked
+away by then, and who comes can be greeted before. Ours."""
 IN_CONTACT: Probability = 0.5
 """Contact from which on there is no silence."""
 TOLD_AGAIN: Probability = 0.05
@@ -51,12 +55,17 @@ def quality(failed: int, judged: int) -> Probability:
     return 1.0 - failed / judged if judged else 1.0
 
 
-def next_level(level: EngagementLevel, value: Probability, config: RecognitionConfig) -> EngagementLevel:
-    """Level of `value`; it changes only when the value has passed a threshold by the hysteresis."""
+def next_level(
+    level: EngagementLevel, value: Probability, config: RecognitionConfig, *, lasts: bool
+) -> EngagementLevel:
+    """Level of `value`; it changes only when the value has passed a threshold by the hysteresis.
+
+    lasts: the contact of who is engaging has lasted; until then nobody becomes engaged.
+    """
     margin = 0.0 if level == "unknown" else HYSTERESIS
     engaged_from = config.engaged_from + (-margin if level == "engaged" else margin)
     disengaged_below = config.disengaged_below + (margin if level == "disengaged" else -margin)
-    if value >= engaged_from:
+    if value >= engaged_from and (level in ("engaged", "disengaging") or (level == "engaging" and lasts)):
         return "engaged"
     if value < disengaged_below:
         return "disengaged"
@@ -76,6 +85,7 @@ class Engagement:
         self._busy_until: Seconds = float("-inf")
         self._apart_since: Seconds = float("-inf")
         """Time at which the last contact ended."""
+        self._engaging_since: Seconds = float("-inf")
 
     def touch(self, much: Probability, at: Seconds) -> None:
         """Take how much of a contact there is from `at` on."""
@@ -88,7 +98,9 @@ class Engagement:
         if self.busy and not busy:
             self._busy_until = now
         if not (self.busy and busy):
-            self.estimate = self._estimate(now)
+            before, self.estimate = self.estimate, self._estimate(now)
+            if self.estimate.level == "engaging" != before.level:
+                self._engaging_since = now
         if busy and not self.busy:
             reasons = ("busy with a task: estimate frozen", *self.estimate.reasons)
             self.estimate = self.estimate._replace(reasons=reasons)
@@ -118,7 +130,10 @@ class Engagement:
         if not known:
             return UNKNOWN
         value = sum(known) / len(known)
-        return EngagementEstimate(value, next_level(self.estimate.level, value, self._config), tuple(reasons))
+        is_in_contact = self.contact.now is None or self.contact.now >= IN_CONTACT
+        lasts = is_in_contact and now >= self._engaging_since + ENGAGES_AFTER
+        level = next_level(self.estimate.level, value, self._config, lasts=lasts)
+        return EngagementEstimate(value, level, tuple(reasons))
 
     def _pace(self, now: Seconds) -> tuple[Probability, tuple[str, str]]:
         """Pace times quality, and why."""
@@ -159,7 +174,7 @@ class Engagement:
         """
         if self.busy or self.estimate.level == "unknown":
             return None
-        changes = [self._recent_from] if self._recent_from > now else []
+        changes = [self._recent_from, self._engaging_since + ENGAGES_AFTER]
         if self.contact.now is None:
             changes += self._level_falls(now)
         elif not self.contact.is_settled(now) or not (self.contact.now >= IN_CONTACT or self._is_low):
