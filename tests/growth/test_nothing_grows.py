@@ -36,7 +36,7 @@ LIMITS = {
     "events": EVENTS_KEPT, "said": UTTERANCES_SHOWN, "warned": WARNINGS_KEPT, "_encoded[*][*]": 2**20,
     "_channel_ids": MOST_CHANNELS, "channel_message_counts": MOST_CHANNELS,
     "_clocks": REPORTERS_KEPT, "_addressed": BLOCKS_KEPT, "_indices": FULL_CHUNK // 31, "records": FULL_CHUNK // 31,
-    "_seen": IDS_KEPT, "joints": 20, "kinds": 4, "_heap": 4 * SLACK, "_scheduled": 400,
+    "_seen": IDS_KEPT, "joints": 20, "kinds": 4, "_heap": 4 * SLACK, "_heap[*]": 4, "_scheduled": 400,
 }  # fmt: skip
 """Containers that are bounded by number, not by time: a message of a recording has 31 bytes at least.
 `joints` and `kinds` are of the message that a service has read last, whichever it was. The last two drop what is
