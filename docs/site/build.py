@@ -47,6 +47,7 @@ CONTENTS = {
         "generation",
         "realizer",
         "recognition",
+        "hearing",
         "control",
         "mujoco",
         "reachy-mini",

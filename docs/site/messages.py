@@ -19,12 +19,13 @@ from engage_hri.schemas import (
     perception,
     recognition,
     requests,
+    sound,
     units,
     world,
 )
 
 MODULES: tuple[ModuleType, ...] = (
-    fragments, blocks, behaviors, recognition, perception, world, body, body_faults, requests, faults, participants,
+    fragments, blocks, behaviors, recognition, perception, sound, world, body, body_faults, requests, faults, participants,
     units,
 )  # fmt: skip
 

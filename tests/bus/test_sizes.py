@@ -95,7 +95,7 @@ async def test_each_row_is_passed_on_at_its_size_and_dropped_with_one_byte_more(
 ) -> None:
     sender, witness = sides
     all_keys = (*SENT, *OF_THE_BUS)
-    for pattern in ("**", f"{keys.PREFIX}/@bus/**"):
+    for pattern in ("**", f"{keys.PREFIX}/@bus/**", f"{keys.PREFIX}/stream/*/@sound/**"):
         witness.session.declare_subscriber(pattern, witness.hear("put"))
     sender.put("begun", b"")
     while not witness.came:

@@ -122,7 +122,7 @@ async def test_late_joiners_of_all_kinds_and_the_death_of_recognition(endpoint: 
 
     assert {one["type"] for one in joined} == {"connection_event", "statistics"}
     assert [one["id"] for one in joined if "id" in one] == [shared.id]
-    assert plain_joined == {"ann: engaged, 1 events\n", f"{shared.id}: {MUTUAL} of ann: succeeded after 0.00 s\n"}
+    assert plain_joined == {"ann: engaging, 1 events\n", f"{shared.id}: {MUTUAL} of ann: succeeded after 0.00 s\n"}
     assert (lost.id, again.session != lost.session) == (shared.id, True)
     assert 2.0 <= waited < PATIENCE
     assert [one["id"] for one in watched] == [lost.id, again.id]
