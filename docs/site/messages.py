@@ -25,8 +25,8 @@ from engage_hri.schemas import (
 )
 
 MODULES: tuple[ModuleType, ...] = (
-    fragments, blocks, behaviors, recognition, perception, sound, world, body, body_faults, requests, faults, participants,
-    units,
+    fragments, blocks, behaviors, recognition, perception, sound, world, body, body_faults, requests, faults,
+    participants, units,
 )  # fmt: skip
 
 HEAD = """\
