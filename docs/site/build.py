@@ -114,4 +114,6 @@ def main(out: Path = OUT) -> int:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) > 2 or any(each.startswith("-") for each in sys.argv[1:]):
+        sys.exit("usage: build.py [FOLDER]: the folder for the pages; what they are made of lies beside it")
     sys.exit(main(*map(Path, sys.argv[1:])))
