@@ -123,7 +123,7 @@ class Recognizer:
     def contacts(self) -> dict[str, Probability | None]:
         """Contact of each person with the robot, of those for whom it may have changed since the last call.
 
-        By what the session knows, or by how much the head attends to the robot, whichever is more; None: neither does.
+        By what the session knows, or by how much the head attends to the robot, whichever is more; None: by neither.
         """
         changed = self.session.contacts()
         for id, much in self._attention.attended.items():
