@@ -172,6 +172,8 @@ class Intake:
         if isinstance(state, SamePeople):  # the last change of it may be long ago: that life went on
             if max(self._former_until, state.at.seconds) > now - FORGOTTEN_AFTER:
                 self._identities.resume(state.people)
+                for same in state.people:
+                    self._recognizer.session.scene.call(self._identities.inside(same.actor), same.actor, same.name)
             self._note(())  # all has been counted by now
             return
         if state.at.seconds <= now - FORGOTTEN_AFTER:
@@ -223,11 +225,13 @@ class Intake:
             self._note(self._recognizer.join(other, kept, now))
             for each in going:
                 self._feed(each, now)
+        session.scene.call(kept, other, join.before, join.name)
 
     def _part(self, parting: Parting) -> None:
         """Take a person for another than was guessed. What is open with them is told as theirs from now on."""
         at, actor = Stamp(self._clock.name, self._now), parting.id
         self._tell(self._reports.part(parting.leaving, parting.old, parting.new, self._now))
+        self._recognizer.session.scene.call(parting.new, *parting.leaving, parting.new)
         if actor == parting.new:
             return  # recognition knows whose id it was by that person's own
         for id, before in tuple(self._told.items()):
