@@ -28,9 +28,6 @@ from msgspec import Struct, field
 
 from engage_hri.schemas.units import Probability, Seconds
 
-JUST_SPOKEN: Seconds = 6.0
-"""Time after somebody's words in which what the other says is still about them: as long as people take to answer
-(`recognition.adjacency_pair_limit`)."""
 LONGEST_UNKNOWN: Seconds = 3.0
 """Time after which a sound that still goes on is speech, and it is decided by the looks so far to whom. Ours."""
 WORDS_AFTER: Seconds = 1.0
@@ -62,9 +59,9 @@ class Spoken(Struct, kw_only=True):
     def is_to(self, actor: str) -> bool:
         return self.to is WHOEVER or (self.to is not None and actor in self.to)
 
-    def is_just_before(self, at: Seconds) -> bool:
-        """True if a speech that begins at `at` comes during this one, or soon after it."""
-        return self.since <= at and (self.until is None or at <= self.until + JUST_SPOKEN)
+    def is_just_before(self, at: Seconds, within: Seconds) -> bool:
+        """True if a speech that begins at `at` comes during this one, or at most `within` after it."""
+        return self.since < at and (self.until is None or at <= self.until + within)
 
 
 class FaceTimes(Struct):
@@ -132,16 +129,19 @@ def certain(
     return None if company and not is_line else frozenset((robot,))
 
 
-def likely(speech: OwnSpeech, spoken: Iterable[Spoken], *, awaited_by: Addressees, is_untold: bool) -> Addressees:
+def likely(
+    speech: OwnSpeech, spoken: Iterable[Spoken], *, within: Seconds, awaited_by: Addressees, is_untold: bool
+) -> Addressees:
     """Addressees by rules 4 to 6, once the speech is over, or so far.
 
-    spoken: what was said before, by all. awaited_by: who has asked the speaker, and still waits for the answer.
+    spoken: what was said before, by all. within: time after somebody's words in which the other's are about them, as
+    long as people take to answer. awaited_by: who has asked the speaker, and still waits for the answer.
     is_untold: perception will say with the words to whom it is, and has not yet.
     """
     if face := speech.faces.most(speech.since):
         return frozenset((face,))
     said = [each for each in spoken if not each.is_noise]
-    recent = [each for each in said if each.is_just_before(speech.since) and each.since < speech.since]
+    recent = [each for each in said if each.is_just_before(speech.since, within)]
     last = max(
         (each for each in recent if speech.actor == each.actor or each.is_to(speech.actor)), key=_since, default=None
     )

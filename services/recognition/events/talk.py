@@ -354,7 +354,8 @@ class Talk(KindRecognizer):
         waits = self._conversation.pair.may_be_answered_with("speak")
         awaited_by = frozenset((self._scene.robot,)) if waits else NOBODY
         is_untold = self._scene.tells_addressees and not says_words(speech.words)
-        to = likely(speech, self._scene.spoken, awaited_by=awaited_by, is_untold=is_untold)
+        within = self._config.adjacency_pair_limit
+        to = likely(speech, self._scene.spoken, within=within, awaited_by=awaited_by, is_untold=is_untold)
         self._address(speech, to, at)
 
     def may_go_on(self, now: Seconds) -> bool:
