@@ -243,7 +243,7 @@ class WindowStatistics(Struct, frozen=True, kw_only=True, omit_defaults=True):
 EngagementLevel = Literal["engaged", "engaging", "disengaging", "disengaged", "unknown"]
 
 
-class Contact(Struct, frozen=True, kw_only=True, omit_defaults=True):
+class PersonContact(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Contact of a person with the robot: looks at it, talk with it, shared looks.
 
     now: how much there is of it; None: nobody tells of looks. share: of the last seconds, up to the instant of the
@@ -275,4 +275,4 @@ class Statistics(Struct, frozen=True, kw_only=True, tag="statistics", omit_defau
     busy: bool = False
     busy_until: Stamp | None = None
     level_since: Stamp | None = None
-    contact: Contact = Contact()
+    contact: PersonContact = PersonContact()
