@@ -208,9 +208,6 @@ class Gazes(KindRecognizer):
                     one.robot_points(at)
             self._forget_idle(at)
 
-    def waits_for(self, block: str, name: str) -> bool:
-        return any(name in clock.waiting for machine in self._machines() for clock in machine.clocks_of(block))
-
     def point_realised(self, block: str, name: str, at: Seconds) -> None:
         for machine in self._machines():
             machine.realised(block, name, at)

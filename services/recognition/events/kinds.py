@@ -80,10 +80,6 @@ class KindRecognizer:
         clock: of its limit. ended: when the turn of a pair, or else the block, was over, if it was before this.
         """
 
-    def waits_for(self, block: str, name: str) -> bool:
-        """True if a time limit runs from this sync point of a block of the robot."""
-        return False
-
     def point_realised(self, block: str, name: str, at: Seconds) -> None:
         """Take a realised sync point of a block of the robot: time limits may run from there."""
 

@@ -214,10 +214,6 @@ class PersonRecognition:
         """Recognizer of the events of this kind."""
         return self._by_kind[kind]
 
-    def waits_for(self, block: str, name: str) -> bool:
-        """True if a time limit runs from this sync point of a block of the robot."""
-        return any(each.waits_for(block, name) for each in self._recognizers)
-
     def point_realised(self, block: str, name: str, at: Seconds) -> None:
         """Take a realised sync point of a block of the robot: time limits may run from there."""
         for each in self._recognizers:

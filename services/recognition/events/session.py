@@ -8,7 +8,7 @@ The times of the observations decide, not those of their arrival: a step that wa
 before it, at its own time. An answer exactly at the limit still counts.
 """
 
-from collections.abc import Callable, Container, Set
+from collections.abc import Callable, Container, Iterable, Set
 from typing import get_args
 
 from engage_hri.schemas.behaviors import EVENT_KINDS, Action, Event, TurnSignal
@@ -75,8 +75,8 @@ class Session:
         """Present speech and gestures of the robot, by behavior."""
         self._heard_at: Seconds | None = None
         """Time when the robot's body last showed that it speaks."""
-        self._live: dict[str, OngoingEvent] = {}
-        """Undecided requests."""
+        self._live: dict[str, tuple[OngoingEvent, LimitClock | None]] = {}
+        """Undecided requests, with the clocks of their limits."""
         self._answering_blocks: Latest[str, str] = Latest(BLOCKS_KEPT)
         """Blocks that answer a person, with the id of that person (empty: all)."""
         self._history = ActionHistory(ACTIONS_KEPT)
@@ -161,10 +161,8 @@ class Session:
                 self._people.see(observation, at)
             case SyncPointProgress(block=block):
                 name = self.blocks.realised(block, observation.behavior, observation.sync, at)
-                asked = {event.responder for event in self._live.values() if event.block == block}
-                for id in asked & self.persons.keys():
-                    if self.persons[id].waits_for(block, name):
-                        self._people.apply(id, at, lambda person: person.point_realised(block, name, at))
+                for id in self._waiting_for(block, name):
+                    self._people.apply(id, at, lambda person: person.point_realised(block, name, at))
             case GoesOn(began=ActionBegan(actor=self.robot)):
                 self._robot_goes_on(observation.began, observation.since, at)
             case GoesOn(began=began, since=since):
@@ -233,7 +231,7 @@ class Session:
 
     def _lose_untold(self, person: str, at: Seconds) -> None:
         """End the events that were asked for and not begun yet: a bug has shown before, or while they waited."""
-        for event in list(self._live.values()):
+        for event, _ in list(self._live.values()):
             if not event.id and event.request and person in (event.initiator, event.responder):
                 self._writer.publish(event, "started", at)
                 self._writer.publish(event, "lost", at)
@@ -394,15 +392,27 @@ class Session:
             accept=wanted.accept or ACCEPT,
         )  # fmt: skip
         self._writer.effects.append(Accepted(id=request.id, within=self._within(event, wanted)))
-        self._live[request.id] = event
+        clock = self._clock(event, wanted)
+        self._live[request.id] = event, clock
         self.announce(request)
-        self._people.apply(wanted.responder, at, lambda person: self._begin(person, event, wanted))
+        self._people.apply(wanted.responder, at, lambda person: self._begin(person, event, clock))
 
-    def _begin(self, person: PersonRecognition, event: OngoingEvent, wanted: Event) -> None:
+    def _begin(self, person: PersonRecognition, event: OngoingEvent, clock: LimitClock | None) -> None:
         """Begin the robot's event with this person."""
         opens_turn = event.kind == "adjacency_pair"
         ended = self._begins_turn(event) if opens_turn else self.blocks.ended.get(event.block)
-        person.recognizer(event.kind).robot_asks(event, self._clock(event, wanted), ended)
+        person.recognizer(event.kind).robot_asks(event, clock, ended)
+
+    def _waiting_for(self, block: str, name: str) -> Iterable[str]:
+        """Persons with a time limit that runs from this sync point of a block of the robot."""
+        return dict.fromkeys(
+            event.responder
+            for event, clock in self._live.values()
+            if clock is not None
+            and event.block == block
+            and name in clock.waiting
+            and event.responder in self.persons
+        )
 
     def _fault_in(self, request: RequestEvent) -> Fault | None:
         event, where = request.event, f"{request.block}: {request.event.id}"
@@ -447,7 +457,8 @@ class Session:
 
     def _begins_turn(self, event: OngoingEvent) -> Seconds | None:
         """Note the first turn of a pair, and whether it is to others, too. Returns when it was over, if it is."""
-        asked = [each for each in self._live.values() if each.kind == "adjacency_pair" and each.turn == event.turn]
+        live = (each for each, _ in self._live.values())
+        asked = [each for each in live if each.kind == "adjacency_pair" and each.turn == event.turn]
         for each in asked if event.turn and len(asked) > 1 else ():
             each.is_to_several = True
         self._speaks_to(event.responder, event.block, event.started)
@@ -475,7 +486,7 @@ class Session:
             self._turn = None
 
     def _cancel(self, cancel: Cancel, at: Seconds) -> None:
-        event = self._live.pop(cancel.id, None)
+        event, _ = self._live.pop(cancel.id, (None, None))
         if event is not None and event.request == cancel.id:
             is_orphan = cancel.cause in ORPHANING
             who = event.initiator if event.responder == self.robot else event.responder
