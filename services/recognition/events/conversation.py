@@ -4,6 +4,7 @@ They are input of the adjacency pair and of the two backchannels, the person's o
 """
 
 from collections.abc import Callable, Iterator
+from math import inf
 
 from engage_hri.schemas.behaviors import Action, Cause
 from engage_hri.schemas.recognition import InterjectionReading
@@ -64,29 +65,29 @@ class Conversation:
         )  # fmt: skip
 
     @property
-    def deadlines(self) -> tuple[Seconds | None, ...]:
-        """Times of the `timed_steps`."""
+    def deadline(self) -> Seconds:
+        """Earliest time of the `timed_steps`."""
         if self.pair.event is None and self._sign is None and self.robot_backchannel.event is None:
-            return ()
-        return self._sign_deadline, self.robot_backchannel.deadline, self._pair_deadline
+            return inf
+        return min(self._sign_deadline, self.robot_backchannel.deadline, self._pair_deadline)
 
     @property
-    def timed_steps(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:
+    def timed_steps(self) -> Iterator[tuple[Seconds, Callable[[Seconds], None]]]:
         """Steps that are due by themselves, with their times."""
         yield self._sign_deadline, self._sign_is_due
         yield self.robot_backchannel.deadline, self._robot_takes_floor
         yield self._pair_deadline, self.pair.expire
 
     @property
-    def _pair_deadline(self) -> Seconds | None:
-        """Deadline of the pair; None while speech of anybody that began in time may yet turn out to be the answer."""
+    def _pair_deadline(self) -> Seconds:
+        """Deadline of the pair; infinite while speech of anybody that began in time may yet be the answer."""
         pair, sign, at = self.pair, self._sign, self.pair.deadline
-        if at is None or not pair.may_be_answered:
+        if at == inf or not pair.may_be_answered:
             return at
         began_in_time = sign is not None and any(in_time(speech.since, at) for speech in sign.speeches)
         if began_in_time and pair.may_be_answered_with("speak"):
-            return None
-        return None if pair.question is not None and self._scene.may_be_answered(self.id, at) else at
+            return inf
+        return inf if pair.question is not None and self._scene.may_be_answered(self.id, at) else at
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         for pair in self._pairs():
@@ -175,10 +176,10 @@ class Conversation:
         self._sign.is_wordless = False  # this one's words may come
 
     @property
-    def _sign_deadline(self) -> Seconds | None:
+    def _sign_deadline(self) -> Seconds:
         sign = self._sign
         if sign is None or (sign.speeches and self._listens(sign.speeches[-1].since)):
-            return None
+            return inf
         return sign.deadline(WORDS_WAIT if self._is_worded else self._config.backchannel_limit)
 
     @property

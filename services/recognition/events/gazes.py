@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from functools import partial
+from math import inf
 from typing import NamedTuple
 
 from engage_hri.schemas.behaviors import Action, Event, EventKind
@@ -42,11 +43,9 @@ class Gazes(KindRecognizer):
         self._robot_directed: list[_Directed] = []
 
     @property
-    def deadlines(self) -> list[Seconds | None]:
-        times = [one.deadline for one in self.directed]
-        if self.facial.event is not None:
-            times.append(self.facial.deadline)
-        return times
+    def deadline(self) -> Seconds:
+        due = inf if self.facial.event is None else self.facial.deadline
+        return min(due, *(one.deadline for one in self.directed)) if self.directed else due
 
     @property
     def timed_steps(self) -> Iterator[TimedStep]:
@@ -65,15 +64,14 @@ class Gazes(KindRecognizer):
         return bool(self.directed) and any(one.is_shared for one in self.directed)
 
     @property
-    def look_directs_at(self) -> Seconds | None:
-        """Time at which the person's look has lasted long enough to direct the robot's; None if it does not."""
+    def look_directs_at(self) -> Seconds:
+        """Time at which the person's look has lasted long enough to direct the robot's; infinite if it does not."""
         gaze = self.gaze
         if not gaze.targets or gaze.spent or gaze.ended is not None or self.id in self._scene.acting:
-            return None
+            return inf
         if not any(map(self._scene.is_object, gaze.targets)):
-            return None
-        silent_since = self._scene.others_silent_since(self.id)
-        return None if silent_since is None else max(self.gaze.since, silent_since) + DIRECT_BY_LOOK
+            return inf
+        return max(gaze.since, self._scene.others_silent_since(self.id)) + DIRECT_BY_LOOK
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         for one in self.directed:

@@ -4,8 +4,9 @@ Kinds that depend on each other have one recognizer: `Gazes` for both of gaze, `
 other kind has its own, the `RECOGNIZER` of a module called like the kind, and is found by that name.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from importlib import import_module
+from math import inf
 
 from engage_hri.schemas.behaviors import Action, Event, EventKind
 from engage_hri.schemas.perception import ActionBegan
@@ -15,8 +16,8 @@ from engage_hri.services.recognition.events.limits import LimitClock
 from engage_hri.services.recognition.events.machine import EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import SessionScene
 
-TimedStep = tuple[Seconds | None, Callable[[Seconds], None]]
-"""Step that is due by itself, with its time. None: it is not due."""
+TimedStep = tuple[Seconds, Callable[[Seconds], None]]
+"""Step that is due by itself, with its time. Infinite: it is not due."""
 
 
 class KindRecognizer:
@@ -32,9 +33,9 @@ class KindRecognizer:
         self._writer = writer
 
     @property
-    def deadlines(self) -> Iterable[Seconds | None]:
-        """Times of the `timed_steps`."""
-        return ()
+    def deadline(self) -> Seconds:
+        """Earliest time of the `timed_steps`."""
+        return inf
 
     @property
     def timed_steps(self) -> Iterator[TimedStep]:

@@ -6,6 +6,7 @@ while, in case they come back.
 
 from collections.abc import Callable
 from functools import partial
+from math import inf
 
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
@@ -201,7 +202,7 @@ class People:
     def _looks_may_direct(self, at: Seconds) -> None:
         """Update the deadlines of those whose looks may direct the robot's now, for what all share has changed."""
         for person in list(self._here.values()):
-            if person.gazes.look_directs_at is not None:
+            if person.gazes.look_directs_at < inf:
                 self._apply(person, at, lambda person: None)
 
     def _apply(self, person: PersonRecognition, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
@@ -223,7 +224,7 @@ class People:
         elif id in scene.questions:
             del scene.questions[id]
         (scene.asked.add if person.talk.is_asked else scene.asked.discard)(id)
-        self.agenda.set(id, person.deadline)
+        self.agenda.set(id, None if (due := person.deadline) == inf else due)
         self._touched.add(id)
         presence = person.presence
         here, was_here = presence.here, id in self._here

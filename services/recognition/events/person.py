@@ -65,17 +65,16 @@ class PersonRecognition:
     # -- time ---------------------------------------------------------------------------------------------------
 
     @property
-    def deadline(self) -> Seconds | None:
+    def deadline(self) -> Seconds:
         """Time of the next step that is due by itself, unless an input comes before; then call `pass_time`."""
-        gaze, times = self.gazes.gaze, [self.presence.deadline]
-        if gaze.targets:
-            times += gaze.deadline, self.gazes.look_directs_at
+        gazes, times = self.gazes, [self.presence.deadline]
+        if gazes.gaze.targets:
+            times += gazes.gaze.deadline, gazes.look_directs_at
         for each in self._recognizers:
-            times += each.deadlines
+            times.append(each.deadline)
         for doing in self._doing.values():
             times.append(doing.until)
-        known = [at for at in times if at is not None]
-        return min(known) if known else None
+        return min(times)
 
     @property
     def _timed_steps(self) -> Iterator[TimedStep]:

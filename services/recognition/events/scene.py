@@ -101,8 +101,8 @@ class GazeState(Struct):
             self.ended = at
 
     @property
-    def deadline(self) -> Seconds | None:
-        return None if self.ended is None else self.ended + SAME_INSTANT
+    def deadline(self) -> Seconds:
+        return inf if self.ended is None else self.ended + SAME_INSTANT
 
     def expire(self) -> Seconds:
         """Let the ended look be over. Returns the time of its end."""
@@ -292,11 +292,11 @@ class SessionScene:
         self.acting.discard(actor)
         self.falls_silent(actor, at)
 
-    def others_silent_since(self, actor: str) -> Seconds | None:
-        """Time since when all but `actor` are silent; None while another speaks."""
-        if self._speakers - {actor}:
-            return None
-        return max((at for at, other in self._fell_silent if other != actor), default=float("-inf"))
+    def others_silent_since(self, actor: str) -> Seconds:
+        """Time since when all but `actor` are silent; infinite while another speaks."""
+        if len(self._speakers) > (actor in self._speakers):
+            return inf
+        return max((at for at, other in self._fell_silent if other != actor), default=-inf)
 
     def knows(self, entity: str) -> bool:
         """True if the entity has ever been seen, or if no object has been seen yet."""

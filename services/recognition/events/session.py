@@ -9,6 +9,7 @@ before it, at its own time. An answer exactly at the limit still counts.
 """
 
 from collections.abc import Callable, Container, Iterable, Set
+from math import inf
 from typing import get_args
 
 from engage_hri.schemas.behaviors import EVENT_KINDS, Action, Event, TurnSignal
@@ -119,21 +120,23 @@ class Session:
     @property
     def deadline(self) -> Seconds | None:
         """Time at which `advance` has something to do, unless an observation comes first."""
-        people = self._people.agenda.earliest
-        if self.scene.gaze.ended is None:
-            return people
-        gaze = self.scene.gaze.deadline
-        return people if gaze is None or (people is not None and people < gaze) else gaze
+        due = self._due
+        return None if due == inf else due
+
+    @property
+    def _due(self) -> Seconds:
+        """The deadline; infinite: there is none."""
+        return min(self._people.agenda.look, self.scene.gaze.deadline)
 
     def advance(self, now: Seconds) -> list[Effect]:
         """Take all steps that are due up to and including `now`."""
-        while (due := self.deadline) is not None and due <= now:
+        while (due := self._due) <= now:
             self._take_step(due)
         self._people.forget(now)
         return self._take()
 
     def _advance_before(self, at: Seconds) -> None:
-        while (due := self.deadline) is not None and due < at - ROUNDING:
+        while (due := self._due) < at - ROUNDING:
             self._take_step(due)
         self._people.forget(at)
 

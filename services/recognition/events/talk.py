@@ -8,6 +8,7 @@ known late has happened early.
 
 from collections import deque
 from collections.abc import Callable, Iterator
+from math import inf
 
 from engage_hri.schemas.behaviors import EVENT_KINDS, Action, Event
 from engage_hri.schemas.perception import ActionBegan
@@ -91,8 +92,8 @@ class Talk(KindRecognizer):
     # -- time ---------------------------------------------------------------------------------------------------
 
     @property
-    def deadlines(self) -> tuple[Seconds | None, ...]:
-        return (self._decided_at,) if self._line else self._conversation.deadlines
+    def deadline(self) -> Seconds:
+        return self._decided_at if self._line else self._conversation.deadline
 
     @property
     def timed_steps(self) -> Iterator[TimedStep]:
@@ -102,11 +103,11 @@ class Talk(KindRecognizer):
             yield from self._conversation.timed_steps
 
     @property
-    def _decided_at(self) -> Seconds | None:
-        """Time at which it is decided to whom the first speech in line is; None: that is known, and it waits."""
+    def _decided_at(self) -> Seconds:
+        """Time at which it is decided to whom the first speech in line is; infinite: that is known, and it waits."""
         _, speech = self._line[0]
         if not isinstance(speech, OwnSpeech) or speech.to is not None:
-            return None
+            return inf
         longest = speech.since + (LONGEST_UNTOLD if self._scene.tells_addressees else LONGEST_UNKNOWN)
         if speech.until is None:
             return longest
@@ -324,7 +325,7 @@ class Talk(KindRecognizer):
         if not self._line:
             return False
         decided_at = self._decided_at
-        return not self._waits_for_others(self._line[0][0]) if decided_at is None else decided_at <= now
+        return not self._waits_for_others(self._line[0][0]) if decided_at == inf else decided_at <= now
 
     def go_on(self, now: Seconds) -> None:
         """Tell all in line up to the next speech of which it is not known to whom it is."""
@@ -344,5 +345,5 @@ class Talk(KindRecognizer):
     def _catch_up(self, until: Seconds) -> None:
         """Take the steps of the conversation that were due before `until`."""
         last = until - ROUNDING
-        while (due := min((at for at in self._conversation.deadlines if at is not None), default=until)) < last:
+        while (due := self._conversation.deadline) < last:
             next(step for at, step in self._conversation.timed_steps if at == due)(due)
