@@ -67,7 +67,7 @@ class Gazes(KindRecognizer):
     def look_directs_at(self) -> Seconds:
         """Time at which the person's look has lasted long enough to direct the robot's; infinite if it does not."""
         gaze = self.gaze
-        if not gaze.targets or gaze.spent or gaze.ended is not None or self.id in self._scene.acting:
+        if not gaze.targets or gaze.spent or gaze.ended < inf or self.id in self._scene.acting:
             return inf
         if not any(map(self._scene.is_object, gaze.targets)):
             return inf

@@ -32,10 +32,10 @@ class People:
         self._unknown: dict[str, Seconds] = {}
         self._asked: set[str] = set()
         """`scene.unknown` and `scene.asked` when the deadlines of those who were asked were last updated."""
-        self._touched: set[str] = set()
-        """Persons whose contact with the robot may have changed since somebody has asked for contacts."""
         self._contacts: dict[str, Probability | None] = {}
-        """Contact of each person as it was last told."""
+        """Contact of each person with the robot."""
+        self._new_contacts: dict[str, Probability | None] = {}
+        """Those that have changed since somebody has asked for them."""
         self._silences = 0
         """`scene.silences` when the deadlines of all were last updated."""
         self._scene = scene
@@ -90,8 +90,8 @@ class People:
         self._here.pop(id, None)
         self._unseen.pop(id, None)
         self._scene.forget_person(id)
-        self._touched.discard(id)
         self._contacts.pop(id, None)
+        self._new_contacts.pop(id, None)
         del self.persons[id]
         self._writer.effects.append(PersonForgotten(id))
         self._follow(now)
@@ -126,12 +126,7 @@ class People:
 
     def contacts(self) -> dict[str, Probability | None]:
         """Contact of each person for whom it has changed since the last call."""
-        touched, told = self._touched, self._contacts
-        if not touched:
-            return {}
-        changed = {id: now for id in touched if (now := self.persons[id].contact) != told.get(id)}
-        touched.clear()
-        told |= changed
+        changed, self._new_contacts = self._new_contacts, {}
         return changed
 
     # -- steps ---------------------------------------------------------------------------------------------
@@ -174,7 +169,8 @@ class People:
         others are silent: while one speaks, looks of all but that one direct nothing.
         """
         scene = self._scene
-        self._tell_taken_up(at)
+        if scene.taken_up or self._writer.answered:
+            self._tell_taken_up(at)
         while self._unknown != scene.unknown or self._asked != scene.asked:
             self._unknown, self._asked = {**scene.unknown}, {*scene.asked}
             for id in [*scene.questions]:
@@ -217,18 +213,31 @@ class People:
             self.lose_track(person, at)
 
     def _update(self, person: PersonRecognition) -> None:
-        """Note when the person is due, whether the robot waits for its answer, and whether it is here."""
-        id, scene = person.id, self._scene
-        if (question := person.talk.question) is not None:
-            scene.questions[id] = question
-        elif id in scene.questions:
-            del scene.questions[id]
-        (scene.asked.add if person.talk.is_asked else scene.asked.discard)(id)
+        """Note when the person is due, whether it is asked, its contact with the robot, and whether it is here."""
+        id, scene, presence = person.id, self._scene, person.presence
+        is_asked = person.talk.is_asked
+        if is_asked or id in scene.asked:
+            self._asks(person, is_asked=is_asked)
         self.agenda.set(id, None if (due := person.deadline) == inf else due)
-        self._touched.add(id)
-        presence = person.presence
+        if (contact := person.contact) != self._contacts.get(id):
+            self._contacts[id] = self._new_contacts[id] = contact
+        if presence.here is not (id in self._here) or presence.reported is not (id in scene.found):
+            self._comes_or_goes(person)
+
+    def _asks(self, person: PersonRecognition, *, is_asked: bool) -> None:
+        """Note whether the robot asks the person, and the question if it waits for the answer."""
+        id, scene, question = person.id, self._scene, person.talk.question
+        if question is not None:
+            scene.questions[id] = question
+        else:
+            scene.questions.pop(id, None)
+        (scene.asked.add if is_asked else scene.asked.discard)(id)
+
+    def _comes_or_goes(self, person: PersonRecognition) -> None:
+        """Note whether the person is here, and whether that is reported."""
+        id, scene, presence = person.id, self._scene, person.presence
         here, was_here = presence.here, id in self._here
-        (scene.found.add if here and presence.reported else scene.found.discard)(id)
+        (scene.found.add if presence.reported else scene.found.discard)(id)
         if was_here and not here:
             del self._here[id]
             scene.present.discard(id)

@@ -75,11 +75,14 @@ class TakenUp(NamedTuple):
 
 
 class GazeState(Struct):
-    """Look of an actor, and its start. ended: time at which it ended, unless the same look begins again at once."""
+    """Look of an actor, and its start.
+
+    ended: time at which it ended, unless the same look begins again at once; infinite: it goes on.
+    """
 
     targets: tuple[str, ...] = ()
     since: Seconds = 0.0
-    ended: Seconds | None = None
+    ended: Seconds = inf
     confidence: Probability = 1.0
     spent: bool = False
     """True if this look answers the robot, or has directed it already: it does not direct it (again)."""
@@ -88,10 +91,10 @@ class GazeState(Struct):
         """Begin a look at `targets`. True if that is a change; a look older than the present one is ignored."""
         if at < self.since:
             return False
-        if targets == self.targets and (self.ended is None or at - self.ended <= SAME_INSTANT):
-            self.ended = None
+        if targets == self.targets and at - self.ended <= SAME_INSTANT:
+            self.ended = inf
             return False
-        self.targets, self.since, self.ended, self.spent = targets, at, None, False
+        self.targets, self.since, self.ended, self.spent = targets, at, inf, False
         self.confidence = confidence
         return True
 
@@ -102,13 +105,12 @@ class GazeState(Struct):
 
     @property
     def deadline(self) -> Seconds:
-        return inf if self.ended is None else self.ended + SAME_INSTANT
+        return self.ended + SAME_INSTANT
 
     def expire(self) -> Seconds:
         """Let the ended look be over. Returns the time of its end."""
-        assert self.ended is not None
         at = self.ended
-        self.targets, self.since, self.ended, self.spent = (), at, None, False
+        self.targets, self.since, self.ended, self.spent = (), at, inf, False
         return at
 
 

@@ -10,7 +10,7 @@ before it, at its own time. An answer exactly at the limit still counts.
 
 from collections.abc import Callable, Container, Iterable, Set
 from math import inf
-from typing import get_args
+from typing import Any, get_args
 
 from engage_hri.schemas.behaviors import EVENT_KINDS, Action, Event, TurnSignal
 from engage_hri.schemas.blocks import BlockProgress, SyncPointProgress
@@ -86,6 +86,14 @@ class Session:
         """To whom the robot speaks in each block."""
         self._turn: tuple[str, Addressees] | None = None
         """The robot's turn that has not ended, and to whom it is."""
+        self._takes: dict[type, Callable[[Any, Seconds], object]] = {
+            ActionBegan: self._begins, ActionEnded: self._ends, GoesOn: self._goes_on,
+            ActorFound: self._found, ActorLost: self._lost, World: self._people.see, Covered: self._hands_changed,
+            Worded: self._understand, RequestEvent: self._request, SignalTurn: self._signal, Cancel: self._cancel,
+            SyncPointProgress: self._point_realised, BlockProgress: self._block_progresses,
+            RobotState: self._robot_is_heard, HeadOwner: self._head_owner_changed,
+        }  # fmt: skip
+        """What each kind of observation changes."""
 
     @property
     def persons(self) -> dict[str, PersonRecognition]:
@@ -151,54 +159,45 @@ class Session:
     def feed(self, observation: Observation | Covered, at: Seconds) -> list[Effect]:
         """Take an observation of what happened at `at`. Slightly late or repeated ones are put right or ignored."""
         self._advance_before(at)
-        match observation:  # what comes most often first
-            case ActionBegan(actor=self.robot):
-                self._robot_begins(observation, at)
-            case ActionEnded(actor=self.robot):
-                self._robot_ends(observation, at)
-            case ActionBegan(actor=actor):
-                self._people.observe(actor, at, lambda person: person.begins(observation, at))
-            case ActionEnded(actor=actor) if actor in self.persons:
-                self._people.observe(actor, at, lambda person: person.ends(observation, at))
-            case World():
-                self._people.see(observation, at)
-            case SyncPointProgress(block=block):
-                name = self.blocks.realised(block, observation.behavior, observation.sync, at)
-                for id in self._waiting_for(block, name):
-                    self._people.apply(id, at, lambda person: person.point_realised(block, name, at))
-            case GoesOn(began=ActionBegan(actor=self.robot)):
-                self._robot_goes_on(observation.began, observation.since, at)
-            case GoesOn(began=began, since=since):
-                self._people.observe(began.actor, at, lambda person: person.goes_on(began, since, at))
-            case ActorFound(actor=actor) if actor != self.robot:
-                self._people.observe(actor, at, lambda person: person.presence.found(at))
-            case ActorLost(actor=actor) if actor in self.persons:
-                self._people.observe(actor, at, lambda person: person.presence.lost(at))
-            case Worded(actor=actor, since=since):
-                if observation.is_line:
-                    self.scene.lines[actor] = since
-                self._understand(observation, at)
-            case RequestEvent():
-                self._request(observation, at)
-            case SignalTurn():
-                self._signal(observation, at)
-            case Cancel():
-                self._cancel(observation, at)
-            case BlockProgress(block=str() as block, progress="start"):
-                self._block_begins(block, at)
-            case BlockProgress(block=str() as block, progress="end"):
-                self._block_ended(block, at, aborted=observation.status in ("failed", "interrupted"))
-            case RobotState(speaking=said):
-                self._robot_is_heard(bool(said), at)
-            case HeadOwner(owner=owner):
-                self.scene.head_owner = owner
-                self._people.apply_to_all(
-                    at, lambda person: person.gazes.head_owner_changed(at), lambda person: person.gazes.is_under_way
-                )
-            case Covered():
-                self.scene.covered = observation
-                self._people.apply_to_all(at, lambda person: person.gazes.hands_changed())
+        self._takes[type(observation)](observation, at)
         return self._take()
+
+    def _begins(self, began: ActionBegan, at: Seconds) -> None:
+        if began.actor == self.robot:
+            self._robot_begins(began, at)
+        else:
+            self._people.observe(began.actor, at, lambda person: person.begins(began, at))
+
+    def _ends(self, ended: ActionEnded, at: Seconds) -> None:
+        if ended.actor == self.robot:
+            self._robot_ends(ended, at)
+        elif ended.actor in self.persons:
+            self._people.observe(ended.actor, at, lambda person: person.ends(ended, at))
+
+    def _goes_on(self, observation: GoesOn, at: Seconds) -> None:
+        began, since = observation.began, observation.since
+        if began.actor == self.robot:
+            self._robot_goes_on(began, since, at)
+        else:
+            self._people.observe(began.actor, at, lambda person: person.goes_on(began, since, at))
+
+    def _found(self, found: ActorFound, at: Seconds) -> None:
+        if found.actor != self.robot:
+            self._people.observe(found.actor, at, lambda person: person.presence.found(at))
+
+    def _lost(self, lost: ActorLost, at: Seconds) -> None:
+        if lost.actor in self.persons:
+            self._people.observe(lost.actor, at, lambda person: person.presence.lost(at))
+
+    def _hands_changed(self, covered: Covered, at: Seconds) -> None:
+        self.scene.covered = covered
+        self._people.apply_to_all(at, lambda person: person.gazes.hands_changed())
+
+    def _head_owner_changed(self, head: HeadOwner, at: Seconds) -> None:
+        self.scene.head_owner = head.owner
+        self._people.apply_to_all(
+            at, lambda person: person.gazes.head_owner_changed(at), lambda person: person.gazes.is_under_way
+        )
 
     def resume(self, former: ConnectionEvent, at: Seconds) -> list[Effect]:
         """Go on with a pair that a former life has begun. The end of its turn is not known: it counts as over now.
@@ -339,6 +338,8 @@ class Session:
 
     def _understand(self, words: Worded, at: Seconds) -> None:
         """Take the words of a person's speech, and to whom perception says that they are."""
+        if words.is_line:
+            self.scene.lines[words.actor] = words.since
         if words.to is not None:
             self.scene.tells_addressees = True
             self.scene.told_addressees[words.actor, words.since] = words.to
@@ -351,9 +352,9 @@ class Session:
             )
         self._writer.interject_again(words.actor, words.since, at)
 
-    def _robot_is_heard(self, is_speaking: bool, at: Seconds) -> None:
+    def _robot_is_heard(self, state: RobotState, at: Seconds) -> None:
         """End speech with a lost end: the body showed that it speaks, and for `SILENCE` no longer does."""
-        if is_speaking:
+        if state.speaking:
             self._heard_at = at
         elif self._heard_at is not None and at > self._heard_at + SILENCE:
             self._heard_at = None
@@ -537,6 +538,18 @@ class Session:
     def _tell(self, actor: str, at: Seconds, step: Step) -> None:
         """Tell what happens to the conversation with a known person, or with all (actor: empty)."""
         self._apply_to_addressees(actor, at, lambda person: person.talk.take(at, step))
+
+    def _point_realised(self, point: SyncPointProgress, at: Seconds) -> None:
+        block = point.block
+        name = self.blocks.realised(block, point.behavior, point.sync, at)
+        for id in self._waiting_for(block, name):
+            self._people.apply(id, at, lambda person: person.point_realised(block, name, at))
+
+    def _block_progresses(self, told: BlockProgress, at: Seconds) -> None:
+        if told.block is not None and told.progress == "start":
+            self._block_begins(told.block, at)
+        elif told.block is not None and told.progress == "end":
+            self._block_ended(told.block, at, aborted=told.status in ("failed", "interrupted"))
 
     def _block_begins(self, block: str, at: Seconds) -> None:
         """Forget an earlier block of this id, and an earlier turn: a turn is called like the block that opens it."""
