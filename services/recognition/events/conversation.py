@@ -67,9 +67,10 @@ class Conversation:
     @property
     def deadline(self) -> Seconds:
         """Earliest time of the `timed_steps`."""
-        if self.pair.event is None and self._sign is None and self.robot_backchannel.event is None:
-            return inf
-        return min(self._sign_deadline, self.robot_backchannel.deadline, self._pair_deadline)
+        due = inf if self.pair.event is None else self._pair_deadline
+        if self._sign is not None or self.robot_backchannel.event is not None:
+            due = min(due, self._sign_deadline, self.robot_backchannel.deadline)
+        return due
 
     @property
     def timed_steps(self) -> Iterator[tuple[Seconds, Callable[[Seconds], None]]]:
@@ -87,7 +88,7 @@ class Conversation:
         began_in_time = sign is not None and any(in_time(speech.since, at) for speech in sign.speeches)
         if began_in_time and pair.may_be_answered_with("speak"):
             return inf
-        return inf if pair.question is not None and self._scene.may_be_answered(self.id, at) else at
+        return inf if self._scene.may_be_answered(self.id, at) and pair.question is not None else at
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         for pair in self._pairs():

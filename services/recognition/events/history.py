@@ -19,7 +19,8 @@ class Latest(dict[Key, Value]):
         self._size = size
 
     def __setitem__(self, key: Key, value: Value) -> None:
-        self.pop(key, None)
+        if key in self:
+            del self[key]
         super().__setitem__(key, value)
         if len(self) > self._size:
             del self[next(iter(self))]

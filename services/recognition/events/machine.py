@@ -177,7 +177,7 @@ class EventWriter:
                 duration=event.duration if ends else None, limit=event.limit if begins else None,
                 response=None if begins else event.response, answered_by=event.answered_by,
                 confidence=event.confidence, block=event.block, behavior=event.behavior, turn=event.turn,
-                words=self._words_of(event),
+                words=self._words_of(event) if event.spoken else "",
                 retold=retold or (begins and event.is_former),
         )  # fmt: skip
         self.effects.append(told)
@@ -241,7 +241,7 @@ class EventWriter:
             del self._spoken[id]
 
     def _words_of(self, event: OngoingEvent) -> str:
-        return " ".join(filter(None, (self._texts.get(speech) for speech in event.spoken)))
+        return " ".join(filter(None, map(self._texts.get, event.spoken)))
 
     def has_open(self, person: str) -> bool:
         """True if an event with `person` is open."""

@@ -47,12 +47,13 @@ class People:
 
     def person(self, id: str) -> PersonRecognition:
         """The person with this id, made if it is new."""
-        if id not in self.persons:
+        person = self.persons.get(id)
+        if person is None:
             self._met += 1
             person = PersonRecognition(id, self._met, self._scene, self._config, self._writer)
             self.persons[id] = self._here[id] = person
             self._scene.present.add(id)
-        return self.persons[id]
+        return person
 
     def see(self, world: World, at: Seconds) -> None:
         """Take a view of the world: people in it are here, those that are missing now may have gone."""
@@ -68,8 +69,7 @@ class People:
     def _note(self, person: PersonRecognition, at: Seconds) -> None:
         """Note a sign of the person, or its leaving, at `at`."""
         self._unseen.pop(person.id, None)
-        reported = person.presence.here and person.presence.reported
-        if not reported and person.id not in self._scene.people_in_world:
+        if not person.presence.reported and person.id not in self._scene.people_in_world:
             self._unseen[person.id] = at
 
     def forget(self, now: Seconds) -> None:
@@ -141,7 +141,8 @@ class People:
     def observe(self, id: str, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
         """Apply a step that an observation of one person asks for; the person may be new."""
         person = self.person(id)
-        self.apply(id, at, step)
+        self._apply(person, at, step)
+        self._follow(at)
         if person.presence.here or id not in self._unseen:
             self._note(person, at)
 

@@ -171,7 +171,7 @@ class SessionScene:
 
         True if something may count as an object now that did not before, or no longer.
         """
-        people, known = set(), len(self._objects)
+        people, known, others = set(), len(self._objects), self._others
         for entity in world.entities:
             id, kind = entity.id, entity.kind
             if kind == "object":
@@ -179,8 +179,8 @@ class SessionScene:
             elif kind == "surface":
                 self._surfaces.add(id)
             else:
-                self._others.pop(id, None)
-                self._others[id] = at
+                others.pop(id, None)
+                others[id] = at
                 if kind == "person" and id != self.robot:
                     people.add(id)
                     if entity.name or id not in self.people_in_world:

@@ -244,7 +244,7 @@ class Session:
         for mishap in [effect for effect in self._writer.effects if isinstance(effect, Mishap)]:
             self._lose_untold(mishap.actor, mishap.at)
         effects = self._writer.take()
-        for effect in effects:
+        for effect in effects if self._live else ():
             if isinstance(effect, EventOutcome):
                 self._live.pop(effect.id, None)
         return effects

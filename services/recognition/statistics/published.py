@@ -84,8 +84,8 @@ class PublishedStatistics:
         busy: persons with a task in hand. contacts: how much of a contact there is now, where that may have changed.
         """
         for actor, much in contacts.items():
-            if much is not None and self._actors[actor].engagement.contact.now != much:
-                self._actors[actor].engagement.touch(much, now)
+            if much is not None and (engagement := self._actors[actor].engagement).contact.now != much:
+                engagement.touch(much, now)
                 self._changed.add(actor)
         for change in changes:
             if isinstance(change, PersonForgotten):
