@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from functools import partial
 from math import inf
+from operator import attrgetter
 from typing import NamedTuple
 
 from engage_hri.schemas.behaviors import Action, Event, EventKind
@@ -32,6 +33,9 @@ class _Directed(NamedTuple):
     at: Seconds
 
 
+_is_shared = attrgetter("is_shared")
+
+
 class Gazes(KindRecognizer):
     """The look of a person, and the gaze events with the robot that come of it."""
 
@@ -45,7 +49,9 @@ class Gazes(KindRecognizer):
     @property
     def deadline(self) -> Seconds:
         due = inf if self.facial.event is None else self.facial.deadline
-        return min(due, *(one.deadline for one in self.directed)) if self.directed else due
+        for one in self.directed:
+            due = min(due, one.deadline)
+        return due
 
     @property
     def timed_steps(self) -> Iterator[TimedStep]:
@@ -61,7 +67,7 @@ class Gazes(KindRecognizer):
     def is_in_contact(self) -> bool:
         if self._scene.robot in self.gaze.targets or self.facial.is_shared:
             return True
-        return bool(self.directed) and any(one.is_shared for one in self.directed)
+        return bool(self.directed) and any(map(_is_shared, self.directed))
 
     @property
     def look_directs_at(self) -> Seconds:
