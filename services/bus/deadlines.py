@@ -113,11 +113,13 @@ class Deadlines(Generic[K]):
             self.clear(name)
         elif self._at.get(name) != at:
             self._at[name] = at
+            changes_look = at <= self.look or self._heap[0][-1] == name
             heapq.heappush(self._heap, (at, self._order and self._order(name), next(self._count), name))
             if len(self._heap) > OUTDATED + 4 * len(self._at):
                 self._heap = [entry for entry in self._heap if self._at.get(entry[-1]) == entry[0]]
                 heapq.heapify(self._heap)
-            self._settle()
+            if changes_look:
+                self._settle()
 
     def _settle(self) -> None:
         """Drop outdated entries from the top."""

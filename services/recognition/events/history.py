@@ -35,7 +35,7 @@ class ActionHistory:
     def is_new(self, action: ActionBegan | ActionEnded, at: Seconds) -> bool:
         """True unless the report repeats an earlier one, or comes after a newer report of the same action."""
         key = (action.action, action.behavior, action.targets)
-        began, ended = self._performed.get(key, (NEVER, NEVER))
+        began, ended = self._performed.pop(key, (NEVER, NEVER))
         begins = isinstance(action, ActionBegan)
         is_new = at > began and at >= ended if begins else at > ended and at >= began
         self._performed[key] = (began, ended) if not is_new else (at, ended) if begins else (began, at)

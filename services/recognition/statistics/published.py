@@ -132,8 +132,12 @@ class PublishedStatistics:
         """Freeze the estimate of who has got busy, and of all, as it is now; or let it go."""
         changed, self._busy = {TOGETHER, *(busy ^ self._busy)}, busy
         for actor in changed:
-            self._actors[actor].engagement.update(now, busy=self._is_busy(actor))
-            self._actors[actor].is_urgent = True
+            one = self._actors[actor]
+            one.is_urgent = True
+            if self._is_busy(actor):
+                one.engagement.update(now, busy=True)
+            else:
+                one.engagement.get_free(now)
         self._changed |= changed
 
     def _is_busy(self, actor: str) -> bool:
