@@ -3,7 +3,7 @@
 They are input of the adjacency pair and of the two backchannels, the person's own and the robot's.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from math import inf
 
 from engage_hri.schemas.behaviors import Action, Cause
@@ -66,18 +66,20 @@ class Conversation:
 
     @property
     def deadline(self) -> Seconds:
-        """Earliest time of the `timed_steps`."""
+        """Time of the next step that is due by itself; infinite: there is none."""
         due = inf if self.pair.event is None else self._pair_deadline
         if self._sign is not None or self.robot_backchannel.event is not None:
             due = min(due, self._sign_deadline, self.robot_backchannel.deadline)
         return due
 
-    @property
-    def timed_steps(self) -> Iterator[tuple[Seconds, Callable[[Seconds], None]]]:
-        """Steps that are due by themselves, with their times."""
-        yield self._sign_deadline, self._sign_is_due
-        yield self.robot_backchannel.deadline, self._robot_takes_floor
-        yield self._pair_deadline, self.pair.expire
+    def pass_time(self, at: Seconds) -> None:
+        """Take the first step that is due at `at`, the `deadline`."""
+        if self._sign_deadline == at:
+            self._sign_is_due(at)
+        elif self.robot_backchannel.deadline == at:
+            self._robot_takes_floor(at)
+        else:
+            self.pair.expire(at)
 
     @property
     def _pair_deadline(self) -> Seconds:

@@ -1,7 +1,6 @@
 """Gaze of one person and the robot: directed gaze, at each set of objects by itself, and mutual facial gaze."""
 
 from collections.abc import Iterator
-from functools import partial
 from math import inf
 from operator import attrgetter
 from typing import NamedTuple
@@ -11,7 +10,7 @@ from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.directed_gaze import HUMAN_DIRECTING, DirectedGaze
-from engage_hri.services.recognition.events.kinds import KindRecognizer, TimedStep
+from engage_hri.services.recognition.events.kinds import KindRecognizer
 from engage_hri.services.recognition.events.limits import LimitClock, in_time
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.mutual_facial_gaze import HUMAN_WAITING, MutualFacialGaze
@@ -53,10 +52,13 @@ class Gazes(KindRecognizer):
             due = min(due, one.deadline)
         return due
 
-    @property
-    def timed_steps(self) -> Iterator[TimedStep]:
-        yield from ((one.deadline, partial(self._expire_directed, one)) for one in self.directed)
-        yield self.facial.deadline, self.facial.expire
+    def pass_time(self, at: Seconds) -> None:
+        one = next((one for one in self.directed if one.deadline == at), None)
+        if one is None:
+            self.facial.expire(at)
+        else:
+            one.expire(at)
+            self._forget_idle(at)
 
     @property
     def is_under_way(self) -> bool:
@@ -96,6 +98,12 @@ class Gazes(KindRecognizer):
             self.gaze.spent = True
 
     # -- looks --------------------------------------------------------------------------------------------------
+
+    @property
+    def look_changes_at(self) -> Seconds:
+        """Time at which the person's look is over, or directs the robot's; infinite: not as things are."""
+        gaze = self.gaze
+        return self.look_directs_at if gaze.ended == inf else gaze.deadline
 
     @property
     def on_robots_face(self) -> bool:
@@ -238,10 +246,6 @@ class Gazes(KindRecognizer):
         yield from self.directed
 
     # -- directed gazes that are over ---------------------------------------------------------------------------
-
-    def _expire_directed(self, one: DirectedGaze, at: Seconds) -> None:
-        one.expire(at)
-        self._forget_idle(at)
 
     def _forget_idle(self, at: Seconds) -> None:
         """Drop finished directed gazes, and remember those of the robot for a while."""

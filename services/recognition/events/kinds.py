@@ -4,7 +4,6 @@ Kinds that depend on each other have one recognizer: `Gazes` for both of gaze, `
 other kind has its own, the `RECOGNIZER` of a module called like the kind, and is found by that name.
 """
 
-from collections.abc import Callable, Iterator
 from importlib import import_module
 from math import inf
 
@@ -15,9 +14,6 @@ from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.limits import LimitClock
 from engage_hri.services.recognition.events.machine import EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import SessionScene
-
-TimedStep = tuple[Seconds, Callable[[Seconds], None]]
-"""Step that is due by itself, with its time. Infinite: it is not due."""
 
 
 class KindRecognizer:
@@ -34,13 +30,11 @@ class KindRecognizer:
 
     @property
     def deadline(self) -> Seconds:
-        """Earliest time of the `timed_steps`."""
+        """Time of the next step that is due by itself; infinite: there is none."""
         return inf
 
-    @property
-    def timed_steps(self) -> Iterator[TimedStep]:
-        """Steps that are due by themselves, in the order in which they happen if the times are equal."""
-        yield from ()
+    def pass_time(self, at: Seconds) -> None:
+        """Take the first step that is due at `at`, the `deadline`."""
 
     @property
     def is_under_way(self) -> bool:

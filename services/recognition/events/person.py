@@ -1,6 +1,5 @@
 """One person and the robot: what each does becomes input of the recognizers of all kinds of events between them."""
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 from engage_hri.schemas.behaviors import EVENT_KINDS, Action, EventKind
@@ -9,7 +8,7 @@ from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.gazes import Gazes
 from engage_hri.services.recognition.events.history import ActionHistory
-from engage_hri.services.recognition.events.kinds import KindRecognizer, TimedStep, own_recognizer
+from engage_hri.services.recognition.events.kinds import KindRecognizer, own_recognizer
 from engage_hri.services.recognition.events.machine import EventWriter
 from engage_hri.services.recognition.events.presence import FacePresence
 from engage_hri.services.recognition.events.scene import GazeState, SessionScene
@@ -67,24 +66,14 @@ class PersonRecognition:
     @property
     def deadline(self) -> Seconds:
         """Time of the next step that is due by itself, unless an input comes before; then call `pass_time`."""
-        gazes, times = self.gazes, [self.presence.deadline]
-        if gazes.gaze.targets:
-            times += gazes.gaze.deadline, gazes.look_directs_at
+        times = [self.presence.deadline]
+        if self.gazes.gaze.targets:
+            times.append(self.gazes.look_changes_at)
         for each in self._recognizers:
             times.append(each.deadline)
         for doing in self._doing.values():
             times.append(doing.until)
         return min(times)
-
-    @property
-    def _timed_steps(self) -> Iterator[TimedStep]:
-        """Steps with their times, in the order in which they happen if the times are equal."""
-        yield self.gaze.deadline, self._gaze_expires
-        yield self.presence.deadline, self.leave
-        for each in self._recognizers:
-            yield from each.timed_steps
-        yield self.gazes.look_directs_at, self.gazes.look_directs
-        yield from ((one.until, self._goes_on_too_long) for one in self._doing.values())
 
     @property
     def is_involved(self) -> bool:
@@ -102,10 +91,16 @@ class PersonRecognition:
 
     def pass_time(self, at: Seconds) -> None:
         """Take the first step that is due at `at`. There is none if something that all share has put it off."""
-        for due, step in self._timed_steps:
-            if due == at:
-                step(at)
-                return
+        if self.gaze.deadline == at:
+            self.gaze_changed(self.gaze.expire())
+        elif self.presence.deadline == at:
+            self.leave(at)
+        elif (due := next((each for each in self._recognizers if each.deadline == at), None)) is not None:
+            due.pass_time(at)
+        elif self.gazes.look_directs_at == at:
+            self.gazes.look_directs(at)
+        else:
+            self._end_overlong(at)
 
     def leave(self, at: Seconds) -> None:
         """Count the person as gone, and close all its open events."""
@@ -186,13 +181,10 @@ class PersonRecognition:
             return LONGEST_SPEECH
         return LONGEST_MANIPULATION if action == "act" else LONGEST_GESTURE
 
-    def _goes_on_too_long(self, at: Seconds) -> None:
+    def _end_overlong(self, at: Seconds) -> None:
         """End actions with a lost end and no later beginning."""
         for action in [action for action, one in self._doing.items() if one.until <= at]:
             self._stops(action, at)
-
-    def _gaze_expires(self, at: Seconds) -> None:
-        self.gaze_changed(self.gaze.expire())
 
     def gaze_changed(self, at: Seconds) -> None:
         """Take a change of the person's gaze."""

@@ -134,7 +134,8 @@ class Session:
     @property
     def _due(self) -> Seconds:
         """The deadline; infinite: there is none."""
-        return min(self._people.agenda.look, self.scene.gaze.deadline)
+        people, gaze = self._people.agenda.look, self.scene.gaze.deadline
+        return people if people < gaze else gaze
 
     def advance(self, now: Seconds) -> list[Effect]:
         """Take all steps that are due up to and including `now`."""

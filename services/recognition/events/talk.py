@@ -7,7 +7,7 @@ known late has happened early.
 """
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from math import inf
 
 from engage_hri.schemas.behaviors import EVENT_KINDS, Action, Event
@@ -23,7 +23,7 @@ from engage_hri.services.recognition.events.addressing import (
     likely,
 )
 from engage_hri.services.recognition.events.conversation import Conversation
-from engage_hri.services.recognition.events.kinds import KindRecognizer, TimedStep
+from engage_hri.services.recognition.events.kinds import KindRecognizer
 from engage_hri.services.recognition.events.limits import ROUNDING, LimitClock
 from engage_hri.services.recognition.events.machine import EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import Question, SessionScene
@@ -95,12 +95,11 @@ class Talk(KindRecognizer):
     def deadline(self) -> Seconds:
         return self._decided_at if self._line else self._conversation.deadline
 
-    @property
-    def timed_steps(self) -> Iterator[TimedStep]:
+    def pass_time(self, at: Seconds) -> None:
         if self._line:
-            yield self._decided_at, self.go_on
+            self.go_on(at)
         else:
-            yield from self._conversation.timed_steps
+            self._conversation.pass_time(at)
 
     @property
     def _decided_at(self) -> Seconds:
@@ -346,4 +345,4 @@ class Talk(KindRecognizer):
         """Take the steps of the conversation that were due before `until`."""
         last = until - ROUNDING
         while (due := self._conversation.deadline) < last:
-            next(step for at, step in self._conversation.timed_steps if at == due)(due)
+            self._conversation.pass_time(due)
