@@ -67,7 +67,7 @@ class Gazes(KindRecognizer):
 
     @property
     def is_in_contact(self) -> bool:
-        if self._scene.robot in self.gaze.targets or self.facial.is_shared:
+        if self._scene.robot in self.gaze.targets or (self.facial.event is not None and self.facial.is_shared):
             return True
         return bool(self.directed) and any(map(_is_shared, self.directed))
 
@@ -98,12 +98,6 @@ class Gazes(KindRecognizer):
             self.gaze.spent = True
 
     # -- looks --------------------------------------------------------------------------------------------------
-
-    @property
-    def look_changes_at(self) -> Seconds:
-        """Time at which the person's look is over, or directs the robot's; infinite: not as things are."""
-        gaze = self.gaze
-        return self.look_directs_at if gaze.ended == inf else gaze.deadline
 
     @property
     def on_robots_face(self) -> bool:

@@ -21,7 +21,7 @@ class Latest(dict[Key, Value]):
     def __setitem__(self, key: Key, value: Value) -> None:
         if key in self:
             del self[key]
-        super().__setitem__(key, value)
+        dict.__setitem__(self, key, value)
         if len(self) > self._size:
             del self[next(iter(self))]
 

@@ -172,8 +172,8 @@ class EventWriter:
         knows_delay = not begins and (state == "failed" or not event.is_former)
         told = ConnectionEvent(
                 id=event.id, kind=event.kind, initiator=event.initiator, responder=event.responder, state=state,
-                at=self.stamp(at), started=self.stamp(event.started), objects=event.objects, cause=event.cause,
-                optional=event.optional, delay=event.delay if knows_delay else None,
+                at=Stamp(self._clock, at), started=Stamp(self._clock, event.started), objects=event.objects,
+                cause=event.cause, optional=event.optional, delay=event.delay if knows_delay else None,
                 duration=event.duration if ends else None, limit=event.limit if begins else None,
                 response=None if begins else event.response, answered_by=event.answered_by,
                 confidence=event.confidence, block=event.block, behavior=event.behavior, turn=event.turn,

@@ -1,5 +1,6 @@
 """One person and the robot: what each does becomes input of the recognizers of all kinds of events between them."""
 
+from math import inf
 from typing import NamedTuple
 
 from engage_hri.schemas.behaviors import EVENT_KINDS, Action, EventKind
@@ -66,14 +67,16 @@ class PersonRecognition:
     @property
     def deadline(self) -> Seconds:
         """Time of the next step that is due by itself, unless an input comes before; then call `pass_time`."""
-        times = [self.presence.deadline]
-        if self.gazes.gaze.targets:
-            times.append(self.gazes.look_changes_at)
+        due, gaze = self.presence.deadline, self.gazes.gaze
+        if gaze.targets:
+            due = min(due, self.gazes.look_directs_at if gaze.ended == inf else gaze.deadline)
         for each in self._recognizers:
-            times.append(each.deadline)
+            if (at := each.deadline) < due:
+                due = at
         for doing in self._doing.values():
-            times.append(doing.until)
-        return min(times)
+            if doing.until < due:
+                due = doing.until
+        return due
 
     @property
     def is_involved(self) -> bool:

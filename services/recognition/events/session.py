@@ -242,13 +242,12 @@ class Session:
     def _take(self) -> list[Effect]:
         if not self._writer.effects:
             return []
-        for mishap in [effect for effect in self._writer.effects if isinstance(effect, Mishap)]:
-            self._lose_untold(mishap.actor, mishap.at)
-        effects = self._writer.take()
-        for effect in effects if self._live else ():
+        for effect in self._writer.effects:  # of which there may be more meanwhile
             if isinstance(effect, EventOutcome):
                 self._live.pop(effect.id, None)
-        return effects
+            elif isinstance(effect, Mishap):
+                self._lose_untold(effect.actor, effect.at)
+        return self._writer.take()
 
     # -- what the robot does ------------------------------------------------------------------------------------
 
