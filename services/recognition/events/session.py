@@ -30,7 +30,7 @@ from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING,
 from engage_hri.services.recognition.events.machine import Effect, EventWriter, Mishap, OngoingEvent
 from engage_hri.services.recognition.events.people import People
 from engage_hri.services.recognition.events.person import PersonRecognition
-from engage_hri.services.recognition.events.scene import Covered, SessionScene, Worded
+from engage_hri.services.recognition.events.scene import SAME_INSTANT, Covered, SessionScene, Worded
 from engage_hri.services.recognition.events.talk import LONGEST_UNKNOWN, LONGEST_UNTOLD, Step
 from engage_hri.services.reports.ongoing_actions import GoesOn
 
@@ -134,7 +134,7 @@ class Session:
     @property
     def _due(self) -> Seconds:
         """The deadline; infinite: there is none."""
-        people, gaze = self._people.agenda.look, self.scene.gaze.deadline
+        people, gaze = self._people.agenda.look, self.scene.gaze.ended + SAME_INSTANT
         return people if people < gaze else gaze
 
     def advance(self, now: Seconds) -> list[Effect]:
@@ -144,13 +144,8 @@ class Session:
         self._people.forget(now)
         return self._take()
 
-    def _advance_before(self, at: Seconds) -> None:
-        while (due := self._due) < at - ROUNDING:
-            self._take_step(due)
-        self._people.forget(at)
-
     def _take_step(self, due: Seconds) -> None:
-        if due == self.scene.gaze.deadline:
+        if due == self.scene.gaze.ended + SAME_INSTANT:
             self._robot_gaze_changed(self.scene.gaze.expire())
         else:
             self._people.advance()
@@ -159,7 +154,9 @@ class Session:
 
     def feed(self, observation: Observation | Covered, at: Seconds) -> list[Effect]:
         """Take an observation of what happened at `at`. Slightly late or repeated ones are put right or ignored."""
-        self._advance_before(at)
+        while (due := self._due) < at - ROUNDING:
+            self._take_step(due)
+        self._people.forget(at)
         self._takes[type(observation)](observation, at)
         return self._take()
 
@@ -414,7 +411,7 @@ class Session:
             for event, clock in self._live.values()
             if clock is not None
             and event.block == block
-            and name in clock.waiting
+            and clock.waits_for(name)
             and event.responder in self.persons
         )
 

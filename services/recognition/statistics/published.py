@@ -70,7 +70,7 @@ class PublishedStatistics:
     @property
     def deadline(self) -> Seconds | None:
         """Time at which `told` has something to do, though nothing has come in."""
-        return self._agenda.earliest
+        return None if self._agenda.look == inf else self._agenda.look
 
     def feed(
         self,
