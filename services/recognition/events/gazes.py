@@ -119,11 +119,9 @@ class Gazes(KindRecognizer):
             robot_on = self._scene.robot_looks_at(one.objects)
             one.gazes(robot_on=robot_on, human_on=human_on, at=at, confidence=confidence)
         self._forget_idle(at)
-        if any(
-            self._scene.person_looks_at(self.gaze, past.objects) and self._is_recent(past, at)
-            for past in self._robot_directed
-        ):
-            self.gaze.spent = True
+        for past in self._robot_directed:
+            if self._scene.person_looks_at(self.gaze, past.objects) and self._is_recent(past, at):
+                self.gaze.spent = True
         self.hands_changed()
 
     def hands_changed(self) -> None:

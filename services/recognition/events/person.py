@@ -1,6 +1,7 @@
 """One person and the robot: what each does becomes input of the recognizers of all kinds of events between them."""
 
 from math import inf
+from operator import attrgetter
 from typing import NamedTuple
 
 from engage_hri.schemas.behaviors import EVENT_KINDS, Action, EventKind
@@ -23,6 +24,9 @@ LONGEST_MANIPULATION: Seconds = 120.0
 """The same for a manipulation. Ours."""
 ACTIONS_KEPT = 64
 """Number of actions of each person for which it is remembered when they last began and ended."""
+
+
+_is_under_way = attrgetter("is_under_way")
 
 
 class _Doing(NamedTuple):
@@ -81,7 +85,7 @@ class PersonRecognition:
     @property
     def is_involved(self) -> bool:
         """True if anything goes on between the person and the robot that the robot's deeds may change."""
-        return any(each.is_under_way for each in self._recognizers)
+        return any(map(_is_under_way, self._recognizers))
 
     @property
     def contact(self) -> Probability | None:

@@ -314,7 +314,7 @@ class SessionScene:
 
     def person_looks_at(self, gaze: GazeState, objects: tuple[str, ...]) -> bool:
         """True if a person's look counts as one at `objects`: at resolution `table` a look at anything there does."""
-        if any(target in objects for target in gaze.targets):
+        if any(map(objects.__contains__, gaze.targets)):
             return True
         if self.resolution == "object":
             return False
@@ -326,7 +326,7 @@ class SessionScene:
         return any(one.actor == actor and (one.left or one.piece in targets) for one in self.covered.by)
 
     def robot_looks_at(self, entities: tuple[str, ...]) -> bool:
-        return any(target in entities for target in self.gaze.targets)
+        return any(map(entities.__contains__, self.gaze.targets))
 
     def robot_since(self, entities: tuple[str, ...]) -> Seconds | None:
         """Start of the robot's look at one of the entities; None if it looks elsewhere."""
