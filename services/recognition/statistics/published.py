@@ -70,7 +70,7 @@ class PublishedStatistics:
     @property
     def deadline(self) -> Seconds | None:
         """Time at which `told` has something to do, though nothing has come in."""
-        return self._agenda.earliest
+        return None if self._agenda.look == inf else self._agenda.look
 
     def feed(
         self,
@@ -84,8 +84,8 @@ class PublishedStatistics:
         busy: persons with a task in hand. contacts: how much of a contact there is now, where that may have changed.
         """
         for actor, much in contacts.items():
-            if much is not None and self._actors[actor].engagement.contact.now != much:
-                self._actors[actor].engagement.touch(much, now)
+            if much is not None and (engagement := self._actors[actor].engagement).contact.now != much:
+                engagement.touch(much, now)
                 self._changed.add(actor)
         for change in changes:
             if isinstance(change, PersonForgotten):
@@ -132,8 +132,12 @@ class PublishedStatistics:
         """Freeze the estimate of who has got busy, and of all, as it is now; or let it go."""
         changed, self._busy = {TOGETHER, *(busy ^ self._busy)}, busy
         for actor in changed:
-            self._actors[actor].engagement.update(now, busy=self._is_busy(actor))
-            self._actors[actor].is_urgent = True
+            one = self._actors[actor]
+            one.is_urgent = True
+            if self._is_busy(actor):
+                one.engagement.update(now, busy=True)
+            else:
+                one.engagement.get_free(now)
         self._changed |= changed
 
     def _is_busy(self, actor: str) -> bool:
