@@ -53,6 +53,7 @@ class People:
             person = PersonRecognition(id, self._met, self._scene, self._config, self._writer)
             self.persons[id] = self._here[id] = person
             self._scene.present.add(id)
+            self._scene.call(id, id)
         return person
 
     def see(self, world: World, at: Seconds) -> None:
