@@ -106,7 +106,7 @@ class Engagement:
     def update(self, now: Seconds, *, busy: bool) -> EngagementEstimate:
         """Update the estimate, and return it. busy: True freezes it as it was when the task began."""
         if self.busy and not busy:
-            self.busy_until = now
+            self.get_free(now)
         if not (self.busy and busy):
             before, self.estimate = self.estimate, self._estimate(now)
             if self.estimate.level != before.level:
@@ -116,6 +116,10 @@ class Engagement:
             self.estimate = self.estimate._replace(reasons=reasons)
         self.busy = busy
         return self.estimate
+
+    def get_free(self, now: Seconds) -> None:
+        """Take the end of the task. The estimate is the frozen one until it is updated."""
+        self.busy, self.busy_until = False, now
 
     def news(self, now: Seconds) -> Literal["", "value", "level"]:
         """Change since it was told: of the level, or by contact alone of the value; "": neither."""

@@ -78,7 +78,7 @@ class PublishedStatistics:
     @property
     def deadline(self) -> Seconds | None:
         """Time at which `told` has something to do, though nothing has come in."""
-        return self._agenda.earliest
+        return None if self._agenda.look == inf else self._agenda.look
 
     def feed(
         self,
@@ -157,8 +157,12 @@ class PublishedStatistics:
         """Freeze the estimate of who has got busy, and of all, as it is now; or let it go."""
         changed, self._busy = {TOGETHER, *(busy ^ self._busy)}, busy
         for actor in changed:
-            self._actors[actor].engagement.update(now, busy=self._is_busy(actor))
-            self._actors[actor].is_urgent = True
+            one = self._actors[actor]
+            one.is_urgent = True
+            if self._is_busy(actor):
+                one.engagement.update(now, busy=True)
+            else:
+                one.engagement.get_free(now)
         self._changed |= changed
 
     def _is_busy(self, actor: str) -> bool:
