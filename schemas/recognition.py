@@ -263,6 +263,7 @@ class Statistics(Struct, frozen=True, kw_only=True, tag="statistics", omit_defau
     engagement: estimate in 0..1; None: too little is known. level: the same in a word. reasons: why, in words.
     busy: the person is busy with a task, so that silence is no sign of less engagement.
     busy_until: when the last task was over. level_since: when the level became what it is; of both None: not known.
+    contact: contact of the person with the robot.
     """
 
     actor: str
