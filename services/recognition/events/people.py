@@ -219,6 +219,10 @@ class People:
         is_asked = person.talk.is_asked
         if is_asked or id in scene.asked:
             self._asks(person, is_asked=is_asked)
+        if (since := person.talk.undecided_since) is not None:
+            scene.unknown[id] = since
+        elif id in scene.unknown:
+            del scene.unknown[id]
         self.agenda.set(id, None if (due := person.deadline) == inf else due)
         if (contact := person.contact) != self._contacts.get(id):
             self._contacts[id] = self._new_contacts[id] = contact
@@ -253,9 +257,9 @@ class People:
 def _answered_by_other(taken_up: TakenUp, asked: PersonRecognition) -> None:
     """Tell the person who was asked that somebody else has answered."""
     _, by, action, at = taken_up
-    asked.talk.other_answers(by, action, at)
+    asked.talk.take_early(at, lambda talk: talk.pair.other_answers(by, action, at))
 
 
 def _answered_for_all(answered: OngoingEvent, at: Seconds, asked: PersonRecognition) -> None:
     """Tell a person that the robot's question to several people, maybe to this one, has been answered."""
-    asked.talk.take(at, lambda talk: talk.pair.answered_for_all(answered, at))
+    asked.talk.take_early(at, lambda talk: talk.pair.answered_for_all(answered, at))
