@@ -1,7 +1,6 @@
 """Two things at the very same instant, and numbers at the very edge: which of them counts."""
 
 import math
-from math import inf
 
 import pytest
 
@@ -47,7 +46,7 @@ def test_a_loss_that_is_told_twice_is_no_second_one_though_the_person_was_found_
     person.found(1.0)
     person.lost(1.0)
 
-    assert person.deadline == inf
+    assert person.deadline == math.inf
 
 
 def test_a_loss_from_before_the_person_was_seen_again_is_none():
@@ -55,7 +54,7 @@ def test_a_loss_from_before_the_person_was_seen_again_is_none():
     person.seen(1.1)
     person.lost(1.0)
 
-    assert person.deadline == inf
+    assert person.deadline == math.inf
 
 
 def test_a_loss_while_the_face_is_lost_is_none_later_either():
@@ -66,7 +65,7 @@ def test_a_loss_while_the_face_is_lost_is_none_later_either():
     person.seen(1.3)
     person.lost(1.2)
 
-    assert person.deadline == inf
+    assert person.deadline == math.inf
 
 
 @pytest.mark.parametrize(("after", "directs"), [(2.0, False), (2.1, True)])
