@@ -209,9 +209,9 @@ class Conversation:
             return inf
         if not self._is_worded:
             return sign.deadline(self._config.backchannel_limit)
-        return (
-            sign.deadline(self._scene.longest_unknown, WORDS_AFTER) if sign.is_beside else sign.deadline(WORDS_WAIT)
-        )
+        if sign.is_beside:
+            return sign.deadline(self._scene.longest_unknown, WORDS_AFTER)
+        return sign.deadline(WORDS_WAIT)
 
     @property
     def beside_since(self) -> Seconds | None:

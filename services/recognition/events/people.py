@@ -53,6 +53,7 @@ class People:
             person = PersonRecognition(id, self._met, self._scene, self._config, self._writer)
             self.persons[id] = self._here[id] = person
             self._scene.present.add(id)
+            self._scene.call(id, id)
         return person
 
     def see(self, world: World, at: Seconds) -> None:
@@ -221,8 +222,8 @@ class People:
             self._asks(person, is_asked=is_asked)
         if (since := person.talk.undecided_since) is not None:
             scene.unknown[id] = since
-        elif id in scene.unknown:
-            del scene.unknown[id]
+        elif scene.unknown:
+            scene.unknown.pop(id, None)
         self.agenda.set(id, None if (due := person.deadline) == inf else due)
         if (contact := person.contact) != self._contacts.get(id):
             self._contacts[id] = self._new_contacts[id] = contact

@@ -185,11 +185,17 @@ class SessionScene:
                 others[id] = at
                 if kind == "person" and id != self.robot:
                     people.add(id)
-                    if entity.name or id not in self.people_in_world:
-                        self.names |= {name.casefold(): id for name in (id, entity.name) if name}
+                    if entity.name:
+                        self.call(id, entity.name)
         if people != self.people_in_world:
             self.people_in_world = frozenset(people)
         return not known or len(self._objects) > known
+
+    def call(self, id: str, *names: str) -> None:
+        """Note names by which people call somebody: as an id is written, and as it is spoken."""
+        for name in names:
+            plain = name.casefold()
+            self.names |= {plain: id, " ".join(plain.replace("_", " ").split()): id}
 
     def told_to(self, person: str, since: Seconds) -> Addressees | None:
         """Addressees of a speech by perception, if they were told before the speech; None: they were not."""
