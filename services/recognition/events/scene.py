@@ -11,7 +11,7 @@ from engage_hri.schemas.fragments import Claim
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import GazeResolution
-from engage_hri.services.recognition.events.addressing import Addressees, Spoken
+from engage_hri.services.recognition.events.addressing import LONGEST_UNKNOWN, LONGEST_UNTOLD, Addressees, Spoken
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, in_time
 
@@ -42,6 +42,7 @@ class Worded(Struct, frozen=True, kw_only=True):
     """Observation: all that is known of the words of a person's speech. since: local time at which that began.
 
     is_alone: nothing but the words tells of this speech, and it is told next. is_line: it was typed in no time.
+    is_announced: words of it have been told that are not final.
     """
 
     actor: str
@@ -49,6 +50,7 @@ class Worded(Struct, frozen=True, kw_only=True):
     text: str
     is_alone: bool = False
     is_line: bool = False
+    is_announced: bool = False
     to: Addressees | None = None
     """Addressees, if perception knows them."""
 
@@ -75,11 +77,14 @@ class TakenUp(NamedTuple):
 
 
 class GazeState(Struct):
-    """Look of an actor, and its start. ended: time at which it ended, unless the same look begins again at once."""
+    """Look of an actor, and its start.
+
+    ended: time at which it ended, unless the same look begins again at once; infinite: it goes on.
+    """
 
     targets: tuple[str, ...] = ()
     since: Seconds = 0.0
-    ended: Seconds | None = None
+    ended: Seconds = inf
     confidence: Probability = 1.0
     spent: bool = False
     """True if this look answers the robot, or has directed it already: it does not direct it (again)."""
@@ -88,10 +93,10 @@ class GazeState(Struct):
         """Begin a look at `targets`. True if that is a change; a look older than the present one is ignored."""
         if at < self.since:
             return False
-        if targets == self.targets and (self.ended is None or at - self.ended <= SAME_INSTANT):
-            self.ended = None
+        if targets == self.targets and at - self.ended <= SAME_INSTANT:
+            self.ended = inf
             return False
-        self.targets, self.since, self.ended, self.spent = targets, at, None, False
+        self.targets, self.since, self.ended, self.spent = targets, at, inf, False
         self.confidence = confidence
         return True
 
@@ -101,14 +106,13 @@ class GazeState(Struct):
             self.ended = at
 
     @property
-    def deadline(self) -> Seconds | None:
-        return None if self.ended is None else self.ended + SAME_INSTANT
+    def deadline(self) -> Seconds:
+        return self.ended + SAME_INSTANT
 
     def expire(self) -> Seconds:
         """Let the ended look be over. Returns the time of its end."""
-        assert self.ended is not None
         at = self.ended
-        self.targets, self.since, self.ended, self.spent = (), at, None, False
+        self.targets, self.since, self.ended, self.spent = (), at, inf, False
         return at
 
 
@@ -169,7 +173,7 @@ class SessionScene:
 
         True if something may count as an object now that did not before, or no longer.
         """
-        people, known = set(), len(self._objects)
+        people, known, others = set(), len(self._objects), self._others
         for entity in world.entities:
             id, kind = entity.id, entity.kind
             if kind == "object":
@@ -177,15 +181,21 @@ class SessionScene:
             elif kind == "surface":
                 self._surfaces.add(id)
             else:
-                self._others.pop(id, None)
-                self._others[id] = at
+                others.pop(id, None)
+                others[id] = at
                 if kind == "person" and id != self.robot:
                     people.add(id)
-                    if entity.name or id not in self.people_in_world:
-                        self.names |= {name.casefold(): id for name in (id, entity.name) if name}
+                    if entity.name:
+                        self.call(id, entity.name)
         if people != self.people_in_world:
             self.people_in_world = frozenset(people)
         return not known or len(self._objects) > known
+
+    def call(self, id: str, *names: str) -> None:
+        """Note names by which people call somebody: as an id is written, and as it is spoken."""
+        for name in names:
+            plain = name.casefold()
+            self.names |= {plain: id, " ".join(plain.replace("_", " ").split()): id}
 
     def told_to(self, person: str, since: Seconds) -> Addressees | None:
         """Addressees of a speech by perception, if they were told before the speech; None: they were not."""
@@ -212,6 +222,11 @@ class SessionScene:
         if other in self.people_in_world:
             self.people_in_world = self.people_in_world - {other} | {kept}
 
+    @property
+    def longest_unknown(self) -> Seconds:
+        """Time after which it is decided what a sound that goes on is, and for whom."""
+        return LONGEST_UNTOLD if self.tells_addressees else LONGEST_UNKNOWN
+
     def is_face(self, target: str) -> bool:
         """True if a look at `target` is one at the face of a person or of the robot."""
         return target == self.robot or target in self.present
@@ -219,16 +234,17 @@ class SessionScene:
     def note_spoken(self, spoken: Spoken) -> None:
         """Remember a speech whose addressees are known now."""
         self.floor_changes += 1
-        self.spoken.append(spoken)
+        if not any(each is spoken for each in self.spoken):
+            self.spoken.append(spoken)
 
     @property
     def robot_speaks_since(self) -> Seconds | None:
         """Time when the robot began what it says now; None: it is silent."""
         return None if self.robot_spoken is None else self.robot_spoken.since
 
-    def robot_speaks_to(self, person: str) -> bool:
-        """True while the robot speaks to this person, or to nobody known."""
-        return self.robot_spoken is not None and self.robot_spoken.is_to(person)
+    def robot_speaks_to(self, person: str) -> Seconds | None:
+        """Time when the robot began what it says now to this person, or to nobody known; None: it says nothing."""
+        return self.robot_spoken.since if self.robot_spoken is not None and self.robot_spoken.is_to(person) else None
 
     def answers_for_another(self, person: str, action: Action, at: Seconds, *, after: Seconds) -> bool:
         """Take what a person says to the robot as the answer to a question that the robot has asked somebody else.
@@ -255,7 +271,7 @@ class SessionScene:
         if not self.asked or not self.unknown:
             return False
         place = self.place(person, at)
-        return any(self.place(who, since) < place for who, since in self.unknown.items())
+        return any(who != person and self.place(who, since) < place for who, since in self.unknown.items())
 
     def place(self, person: str, at: Seconds) -> tuple[Seconds, bool, str]:
         """Place of what a person begins to say in the order in which people are heard: who is asked comes first."""
@@ -292,11 +308,11 @@ class SessionScene:
         self.acting.discard(actor)
         self.falls_silent(actor, at)
 
-    def others_silent_since(self, actor: str) -> Seconds | None:
-        """Time since when all but `actor` are silent; None while another speaks."""
-        if self._speakers - {actor}:
-            return None
-        return max((at for at, other in self._fell_silent if other != actor), default=float("-inf"))
+    def others_silent_since(self, actor: str) -> Seconds:
+        """Time since when all but `actor` are silent; infinite while another speaks."""
+        if len(self._speakers) > (actor in self._speakers):
+            return inf
+        return max((at for at, other in self._fell_silent if other != actor), default=-inf)
 
     def knows(self, entity: str) -> bool:
         """True if the entity has ever been seen, or if no object has been seen yet."""
@@ -312,7 +328,7 @@ class SessionScene:
 
     def person_looks_at(self, gaze: GazeState, objects: tuple[str, ...]) -> bool:
         """True if a person's look counts as one at `objects`: at resolution `table` a look at anything there does."""
-        if any(target in objects for target in gaze.targets):
+        if any(map(objects.__contains__, gaze.targets)):
             return True
         if self.resolution == "object":
             return False
@@ -324,7 +340,7 @@ class SessionScene:
         return any(one.actor == actor and (one.left or one.piece in targets) for one in self.covered.by)
 
     def robot_looks_at(self, entities: tuple[str, ...]) -> bool:
-        return any(target in entities for target in self.gaze.targets)
+        return any(map(entities.__contains__, self.gaze.targets))
 
     def robot_since(self, entities: tuple[str, ...]) -> Seconds | None:
         """Start of the robot's look at one of the entities; None if it looks elsewhere."""
