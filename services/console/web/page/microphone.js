@@ -130,6 +130,7 @@ export function microphone(panel, session) {
     if (track.readyState === "ended") off(GONE);
     else if (performance.now() - own.heard > SILENT) tell("The microphone gives no sound: is it muted, or held by another program?");
     else if (performance.now() - own.link.answered() > SILENT) tell("The window does not answer: nobody knows whether you are heard.");
+    else if (own.link.unheard()) tell(`Nobody hears you: ${own.link.unheard()}.`);
     else if (own.lost) tell(`Your link is slow: ${own.lost.toFixed(1)} s of your voice were lost.`);
     else if (track.muted) tell("The system has muted the microphone.");
     else tell("");
