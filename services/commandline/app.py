@@ -36,6 +36,7 @@ FAMILIES: dict[str, dict[str, str]] = {
         "doctor": "Tell who sees whom, what is wrong, and what to do. Exit 1 if something is wrong.",
     },
     "talk": {
+        "talk": "Talk with a robot: voice, ears and a manager of a few rules, in a tab of the browser or on devices.",
         "play": "Perform turn fragments and BML blocks. Exit 0 done, 2 input refused, 3 failed while running.",
         "steer": "Hold what a running robot performs, let it continue, or stop it; begin a condition of a study. "
         "Exit 2 if it is not being performed.",
