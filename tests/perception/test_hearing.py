@@ -224,7 +224,7 @@ async def test_a_microphone_that_goes_ends_the_speech_is_told_once_and_tried_aga
     """It is unplugged in mid-speech, twice not there, and then there again."""
     said, gone = voice("move the purple triangle to the top"), 0
 
-    async def recorded(source: str, channels: int) -> AsyncIterator[Piece]:
+    async def recorded() -> AsyncIterator[Piece]:
         nonlocal gone
         loop = asyncio.get_running_loop()
         gone += 1
@@ -233,7 +233,7 @@ async def test_a_microphone_that_goes_ends_the_speech_is_told_once_and_tried_aga
             yield Piece(said[at : at + 320, None], loop.time() - 0.02)
         raise SoundLost(Fault(reason="the microphone is gone"))
 
-    monkeypatch.setattr(service, "pieces", recorded)
+    monkeypatch.setattr(service, "opened", lambda source, channels: recorded)
     async with hearing(hub, source="arecord") as heard:
         await asyncio.sleep(8.5)
 
@@ -277,7 +277,7 @@ async def test_a_recognizer_that_fails_is_told_and_the_speech_has_no_words(
     ("settings", "reason"),
     [
         ({"source": "nowhere.wav"}, "No such file"),
-        ({"source": "nowhere.wav", "recognizer": "nobody"}, "no recognizer 'nobody'"),
+        ({"source": "SILENT", "recognizer": "nobody"}, "no recognizer 'nobody'"),
         ({"source": "SILENT", "people": ("ann", "ben")}, "it has 1 channels, and `hearing.people` names 2"),
     ],
 )
@@ -285,8 +285,8 @@ async def test_what_cannot_be_heard_is_refused(hub: MemoryHub, tmp_path: Path, s
     silent = write_wav(tmp_path / "silent.wav", np.zeros(RATE, np.int16))
     settings = {**settings, "source": settings["source"].replace("SILENT", str(silent))}
     with pytest.raises((InputRefused, ExceptionGroup)) as refused:
-        async with hearing(hub, **settings) as heard:
-            await heard.over.wait()
+        async with hearing(hub, **settings):
+            pytest.fail("it has said that it is ready")
     raised: BaseException = refused.value
     while isinstance(raised, ExceptionGroup):
         [raised] = raised.exceptions

@@ -11,7 +11,7 @@ import pytest
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.perception.hearing import listening, microphone
 from engage_hri.services.perception.hearing.listening import InItsOwn, Order
-from engage_hri.services.perception.hearing.microphone import SoundLost, command, pieces
+from engage_hri.services.perception.hearing.microphone import SoundLost, command, opened
 from engage_hri.services.perception.hearing.recognizing import (
     Answer,
     KnownWords,
@@ -163,7 +163,7 @@ async def test_a_program_that_records_gives_samples_until_it_ends_and_that_is_to
 
     heard: list[Piece] = []
     with pytest.raises(SoundLost) as lost:
-        await all_of(pieces(script(tmp_path, text), 2), heard)
+        await all_of(opened(script(tmp_path, text), 2)(), heard)
     assert sum(len(piece.samples) for piece in heard) == 1600
     assert {piece.samples.shape[1] for piece in heard} == {2}
     assert "has ended with code 1: the microphone was pulled out" in lost.value.fault.reason
@@ -172,13 +172,13 @@ async def test_a_program_that_records_gives_samples_until_it_ends_and_that_is_to
 async def test_a_program_that_gives_nothing_is_taken_for_dead(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(microphone, "STARTING", 0.7)
     with pytest.raises(SoundLost, match=r"gives no sample for 0\.7 s"):
-        await anext(pieces(script(tmp_path, "time.sleep(99)"), 1))
+        await anext(opened(script(tmp_path, "time.sleep(99)"), 1)())
     monkeypatch.setattr(microphone, "STARTING", 20.0)
     monkeypatch.setattr(microphone, "SILENT", 0.5)
     with pytest.raises(SoundLost, match=r"gives no sample for 0\.5 s"):
-        await all_of(pieces(script(tmp_path, "out.write(bytes(640))\nout.flush()\ntime.sleep(99)"), 1), [])
+        await all_of(opened(script(tmp_path, "out.write(bytes(640))\nout.flush()\ntime.sleep(99)"), 1)(), [])
     with pytest.raises(SoundLost, match="does not start"):
-        await anext(pieces((str(tmp_path / "nothing"),), 1))
+        await anext(opened((str(tmp_path / "nothing"),), 1)())
 
 
 def test_where_no_program_records_it_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch):

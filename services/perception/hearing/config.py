@@ -9,11 +9,12 @@ class HearingConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """Settings of hearing. Raises ValueError if out of range."""
 
     source: str | tuple[str, ...] = "auto"
-    """The sound: a WAV file; a program that records: `parec`, `arecord`, `rec`, `sounddevice`; `auto`: the first of
-    these that is here; or a command, as a list, that writes raw samples (16 bit, little-endian, 16 kHz)."""
+    """The sound: a WAV file; `page`: the microphones of all pages of windows; a program that records: `parec`,
+    `arecord`, `rec`, `sounddevice`; `auto`: the first of these that is here; or a command, as a list, that writes raw
+    samples (16 bit, little-endian, 16 kHz)."""
     people: tuple[str, ...] = ()
     """Ids of those who speak, one for each channel of the sound; empty: there is one channel, and who speaks is the
-    only person in the world, or else `visitor`."""
+    only person in the world, or else `visitor`. Of a page it is who sits there, and this is left out."""
     is_deaf_while_robot_speaks: bool | None = None
     """Whether nothing is heard while the robot's voice sounds, since it cannot be told from a person's. Without a
     value: yes for sound that is recorded now, no for a file."""
@@ -33,3 +34,5 @@ class HearingConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     def __post_init__(self) -> None:
         positive(self, ("pause",))
+        if self.people and self.source == "page":
+            raise ValueError("`people` are those of the channels of a device: who sits at a page is known")

@@ -10,7 +10,8 @@ import asyncio
 import shutil
 import sys
 from collections import deque
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Callable
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.perception.hearing.child import PipedProcess
 from engage_hri.services.perception.hearing.sound import Piece, SampleClock, read_wav
-from engage_hri.services.perception.hearing.voice import RATE
+from engage_hri.services.perception.hearing.voice import RATE, Samples
 from engage_hri.services.runtime.installation import packages_command
 
 PIECE: Seconds = 0.02
@@ -31,6 +32,8 @@ STARTING: Seconds = 5.0
 """Time until the first sample: devices have to wake up."""
 KEPT = 256
 """Pieces that wait at most while the loop is busy."""
+PAGE = "page"
+"""Source that is no device: what the pages of windows send."""
 OURS = "engage_hri.services.perception.hearing.microphone"
 RECORDERS = {
     "parec": ("parec", "--raw", "--format=s16le", "--rate={rate}", "--channels={channels}", "--latency-msec=20"),
@@ -47,15 +50,12 @@ class SoundLost(EngageError):
 
 
 def is_file(source: str | tuple[str, ...]) -> bool:
-    """Tell whether a source is a file, and no device."""
-    return isinstance(source, str) and source not in ("auto", *RECORDERS)
+    """Tell whether a source is a file, and no device, nor the pages of windows."""
+    return isinstance(source, str) and source not in ("auto", PAGE, *RECORDERS)
 
 
-async def played(path: Path, channels: int) -> AsyncGenerator[Piece, None]:
-    """Play a WAV file in the time of the loop, from now on. Raises InputRefused: it cannot be read.
-
-    channels: that it has to have at least.
-    """
+def read_file(path: Path, channels: int) -> Samples:
+    """Read a WAV file. channels: that it has to have at least. Raises InputRefused: it cannot be read."""
     try:
         with path.open("rb") as file:
             samples = read_wav(file, str(path))
@@ -64,10 +64,15 @@ async def played(path: Path, channels: int) -> AsyncGenerator[Piece, None]:
     if samples.shape[1] < channels:
         reason = f"it has {samples.shape[1]} channels, and `hearing.people` names {channels}"
         raise InputRefused(Fault(reason=reason, where=str(path)))
+    return samples[:, :channels]
+
+
+async def played(samples: Samples) -> AsyncGenerator[Piece, None]:
+    """Play the sound of a file in the time of the loop, from now on."""
     loop = asyncio.get_running_loop()
     begin, step = loop.time(), round(PIECE * RATE)
     for first in range(0, len(samples), step):
-        piece = samples[first : first + step, :channels]
+        piece = samples[first : first + step]
         await asyncio.sleep(begin + (first + len(piece)) / RATE - loop.time())
         yield Piece(piece, begin + first / RATE)
 
@@ -133,11 +138,14 @@ async def recorded(program: tuple[str, ...], channels: int) -> AsyncGenerator[Pi
         child.close()
 
 
-def pieces(source: str | tuple[str, ...], channels: int) -> AsyncGenerator[Piece, None]:
-    """Sound of a source. Raises InputRefused or, later, SoundLost."""
+def opened(source: str | tuple[str, ...], channels: int) -> Callable[[], AsyncGenerator[Piece, None]]:
+    """Find a file or a device. Returns what gives its sound, whenever it is called, and may raise SoundLost.
+
+    Raises InputRefused: there is none.
+    """
     if is_file(source):
-        return played(Path(str(source)), channels)
-    return recorded(command(source, channels), channels)
+        return partial(played, read_file(Path(str(source)), channels))
+    return partial(recorded, command(source, channels), channels)
 
 
 def main() -> None:

@@ -6,7 +6,7 @@ back when they are known. Where a recognizer is at work, an utterance without wo
 
 import asyncio
 import time
-from collections.abc import AsyncGenerator, Iterable
+from collections.abc import AsyncGenerator, Callable, Iterable
 from contextlib import aclosing
 from itertools import count
 
@@ -24,6 +24,7 @@ from engage_hri.schemas.perception import (
     ActorLost,
     Utterance,
 )
+from engage_hri.schemas.sound import SoundFrame
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus import journal
@@ -32,10 +33,12 @@ from engage_hri.services.client.people.perceived_person import PerceivedActions,
 from engage_hri.services.client.people.shared_world import SharedWorld
 from engage_hri.services.perception.hearing.config import HearingConfig
 from engage_hri.services.perception.hearing.listening import InItsOwn, InThisProcess, Order, Understanding
-from engage_hri.services.perception.hearing.microphone import SoundLost, is_file, pieces
+from engage_hri.services.perception.hearing.microphone import PAGE, SILENT, SoundLost, is_file, opened
 from engage_hri.services.perception.hearing.recognizing import Answer, KnownWords, SpeechWords, settings_of
 from engage_hri.services.perception.hearing.sound import Piece
 from engage_hri.services.perception.hearing.voice import (
+    RATE,
+    Samples,
     VoiceBegan,
     VoiceEar,
     VoiceEnded,
@@ -57,16 +60,23 @@ ECHO: Seconds = 0.2
 """Time for which the robot's voice goes on in the room, and in the devices, when it has ended."""
 LAST_WORDS: Seconds = 25.0
 """Time that the words of a file may take when it is over."""
+MOST_PAGES = 16
+"""Microphones of pages that are heard at once: a detector needs 10 MB, and 0.7 % of a processor."""
+OLD: Seconds = 10.0
+"""Age from which on sound of a page is of no use."""
+WHOLE: Seconds = 5.0
+"""Time without loss after which a loss is told again."""
 
 
 async def hear(bus: Bus, ready: Ready, config: HearingConfig) -> None:
     """Serve until cancelled, or until the file is over and all that was said in it is told.
 
-    A file begins when recognition is there, for before that its first words would be lost.
+    What is said before recognition is there would be lost: a file begins then, and pages are heard from then on.
 
     Raises InputRefused: there is no such sound or recognizer, or a package is not installed.
     """
-    with bus.subscribe(keys.ANY_ROBOT_ALIVE, keys.WORLD, keys.ROBOT_ACTION) as inbox:
+    pages = (keys.ANY_SOUND,) if config.source == PAGE else ()
+    with bus.subscribe(keys.ANY_ROBOT_ALIVE, keys.WORLD, keys.ROBOT_ACTION, *pages) as inbox:
         tell_settings(bus, "hearing", config)
         hearing = _Hearing(bus, config)
         try:
@@ -74,7 +84,7 @@ async def hear(bus: Bus, ready: Ready, config: HearingConfig) -> None:
                 await hearing.recognizer.made()
             ready()
             await hearing.wait_for_recognition(inbox)
-            await hearing.listen(inbox)
+            await (hearing.hear_pages(inbox) if pages else hearing.listen(inbox))
         finally:
             hearing.close()
 
@@ -86,21 +96,47 @@ class _Speech:
         self.number, self.utterance = number, utterance
 
 
+class _Channel:
+    """A channel of sound. person: whose voice is in it; empty: that of the only person who is here.
+
+    voice: what is being said; None also of a voice that is nobody's.
+    """
+
+    def __init__(self, person: str, pause: Seconds) -> None:
+        self.person = person
+        self.ear = VoiceEar(silero(), pause)
+        self.voice: _Speech | None = None
+
+
+class _PageChannel(_Channel):
+    """The microphone of a page. number: of the last frame. came: loop time of its arrival. lossy: that of a loss."""
+
+    def __init__(self, person: str, pause: Seconds, number: int) -> None:
+        super().__init__(person, pause)
+        self.number, self.came, self.lossy = number, 0.0, float("-inf")
+
+
 class _Hearing:
     """The ears of the service, and what was heard. recognizer: None: nobody understands words."""
 
     def __init__(self, bus: Bus, config: HearingConfig) -> None:
+        """Raises InputRefused: there is no such source or recognizer, or a package is not installed."""
         self._bus, self._config = bus, config
-        self._channels = max(1, len(config.people))
+        people = config.people or ("",)
+        self._pages: dict[str, _PageChannel] = {}
+        """Channels of pages, by person."""
+        self._channels: list[_Channel] = []
+        """Those of a file or a device."""
         try:
-            self._ears = [VoiceEar(silero(), config.pause) for _ in range(self._channels)]
+            silero()
         except ModuleNotFoundError as error:
             raise InputRefused(Fault(reason=str(error), where="hearing", advice=extra_command("hearing"))) from error
+        if config.source != PAGE:
+            self._sound: Callable[[], AsyncGenerator[Piece, None]] = opened(config.source, len(people))
+            self._channels = [_Channel(person, config.pause) for person in people]
         self._world, self._perceived = SharedWorld(bus.name), PerceivedActions(bus)
         self._own: dict[str, Entity] = {}
         """The people whom this service has brought into the world, since nobody else tells of them."""
-        self._voices: list[_Speech | None] = [None] * self._channels
-        """What is being said, by channel; None also of a voice that is nobody's."""
         self._awaited: dict[int, _Speech] = {}
         """Speeches whose words are not known for good, by number."""
         self._all_known = asyncio.Event()
@@ -134,7 +170,7 @@ class _Hearing:
         """Hear all that the source gives; what a device does not give is told, and it is tried again."""
         while True:
             try:
-                async with aclosing(pieces(self._config.source, self._channels)) as sound:
+                async with aclosing(self._sound()) as sound:
                     await self._hear(inbox, sound)
                 return
             except SoundLost as lost:
@@ -152,13 +188,10 @@ class _Hearing:
                 received = await inbox.next()
                 if received is not None:
                     self._take(received)
-            for channel, ear in enumerate(self._ears):
-                samples = np.ascontiguousarray(piece.samples[:, channel])
-                if self._is_deaf and self._robot_speaks(piece.at):
-                    samples = np.zeros_like(samples)
-                self._tell(channel, ear.feed(samples, piece.at))
-        for channel, ear in enumerate(self._ears):
-            self._tell(channel, ear.lose())
+            for number, channel in enumerate(self._channels):
+                self._feed(channel, np.ascontiguousarray(piece.samples[:, number]), piece.at)
+        for channel in self._channels:
+            self._tell(channel, channel.ear.lose())
         if self._awaited:
             self._all_known.clear()
             try:
@@ -169,31 +202,90 @@ class _Hearing:
 
     def close(self) -> None:
         """End what goes on, let the people leave who were brought, and end the recognizer."""
-        for channel, ear in enumerate(self._ears):
-            self._tell(channel, ear.lose())
+        for channel in (*self._channels, *self._pages.values()):
+            self._tell(channel, channel.ear.lose())
         if self.recognizer is not None:
             self.recognizer.close()
-        if self._own:
-            people = tuple(self._own)
-            self._own.clear()
-            self._show(self._bus.now())
-            self._perceived.tell(*(ActorLost(actor=person, at=self._bus.stamp()) for person in people))
+        self._let_go(*self._own)
+
+    # -- pages --------------------------------------------------------------------------------------------------
+
+    async def hear_pages(self, inbox: Subscription) -> None:
+        """Hear all microphones of pages that are on, for ever. One that gives nothing any more is told, and ends."""
+        while True:
+            until = min((page.came for page in self._pages.values()), default=float("inf")) + SILENT
+            received = await inbox.next(until)
+            if received is None:
+                for page in [page for page in self._pages.values() if self._bus.now() >= page.came + SILENT]:
+                    self._end(page)
+                    reason = f"no sound comes any more from the microphone of {page.person}"
+                    advice = "is the page, or the computer it is on, asleep or cut off?"
+                    self._publish(Fault(reason=reason, where=keys.sound(page.person), advice=advice))
+            elif isinstance(received.message, SoundFrame):
+                with self._bus.containing(received):
+                    self._hear_page(received.key.rpartition("/")[2], received.message)
+            else:
+                self._take(received)
+
+    def _hear_page(self, person: str, frame: SoundFrame) -> None:
+        now, page = self._bus.now(), self._pages.get(person)
+        if not frame.samples:
+            if page is not None:
+                self._end(page)
+                self._bus.log.info("the microphone of %s is off", person)
+            return
+        if frame.rate != RATE:
+            reason = f"the sound of {person} has {frame.rate} samples per second: expected {RATE}"
+            self._bus.tell_refused(Fault(reason=reason, where=keys.sound(person)), person)
+            return
+        at = min(self._bus.local(frame.at), now - len(frame.samples) / 2 / RATE)
+        if now - at > OLD or (page is None and (page := self._begin(person, frame.number)) is None):
+            return
+        if frame.number > page.number + 1:
+            if now - page.lossy > WHOLE:
+                reason = f"sound from the microphone of {person} is lost on its way"
+                self._publish(Fault(reason=reason, where=keys.sound(person), advice="the link of the page is slow"))
+            page.lossy = now
+        page.number, page.came = frame.number, now
+        self._feed(page, np.frombuffer(frame.samples, "<i2"), at)
+
+    def _begin(self, person: str, number: int) -> _PageChannel | None:
+        """Begin to hear a page with the frame of this number. None: there are so many that it is not heard."""
+        if len(self._pages) >= MOST_PAGES:
+            reason = f"{MOST_PAGES} microphones are heard already, and that of {person} is not"
+            self._bus.tell_refused(Fault(reason=reason, where=keys.sound(person)), person)
+            return None
+        self._bus.log.info("the microphone of %s is on", person)
+        page = self._pages[person] = _PageChannel(person, self._config.pause, number)
+        return page
+
+    def _end(self, page: _PageChannel) -> None:
+        """Hear a page no more: what was being said has ended, and who was brought by it leaves."""
+        self._tell(page, page.ear.lose())
+        del self._pages[page.person]
+        self._let_go(page.person)
 
     # -- voices -------------------------------------------------------------------------------------------------
 
-    def _tell(self, channel: int, events: Iterable[VoiceEvent]) -> None:
+    def _feed(self, channel: _Channel, samples: Samples, at: Seconds) -> None:
+        """Let a channel have more sound. at: loop time at which its first sample was captured."""
+        if self._is_deaf and self._robot_speaks(at):
+            samples = np.zeros_like(samples)
+        self._tell(channel, channel.ear.feed(samples, at))
+
+    def _tell(self, channel: _Channel, events: Iterable[VoiceEvent]) -> None:
         for event in events:
             match event:
                 case VoiceBegan(at=at):
-                    self._voices[channel] = self._began(channel, at)
-                case VoiceSound(samples=samples) if (speech := self._voices[channel]) is not None:
+                    channel.voice = self._began(channel, at)
+                case VoiceSound(samples=samples) if channel.voice is not None:
                     if self.recognizer is not None:
-                        self.recognizer.hear(speech.number, samples.astype("<i2").tobytes())
-                case VoiceEnded(at=at) if (speech := self._voices[channel]) is not None:
-                    self._voices[channel] = None
+                        self.recognizer.hear(channel.voice.number, samples.astype("<i2").tobytes())
+                case VoiceEnded(at=at) if (speech := channel.voice) is not None:
+                    channel.voice = None
                     self._ended(speech, at)
 
-    def _began(self, channel: int, at: Seconds) -> _Speech | None:
+    def _began(self, channel: _Channel, at: Seconds) -> _Speech | None:
         if (person := self._speaker(channel)) is None:
             return None
         self._bring(person, at)
@@ -213,10 +305,10 @@ class _Hearing:
         if self.recognizer is not None:
             self.recognizer.hear(speech.number, b"")
 
-    def _speaker(self, channel: int) -> str | None:
+    def _speaker(self, channel: _Channel) -> str | None:
         """The person whose voice this is. None: there are several, and one channel cannot tell them apart."""
-        if self._config.people:
-            return self._config.people[channel]
+        if channel.person:
+            return channel.person
         here = [each.id for each in self._world.entities if each.kind == "person"]
         if len(here) > 1:
             reason = f"whose voice it is cannot be told: {', '.join(here)} are here, and there is one channel"
@@ -228,8 +320,8 @@ class _Hearing:
         return self._robot_speaks_until is not None and at < self._robot_speaks_until
 
     def _lose(self, fault: Fault) -> None:
-        for channel, ear in enumerate(self._ears):
-            self._tell(channel, ear.lose())
+        for channel in self._channels:
+            self._tell(channel, channel.ear.lose())
         self._complain(fault)
 
     def _complain(self, fault: Fault) -> None:
@@ -285,6 +377,13 @@ class _Hearing:
         self._own[person] = Entity(id=person, kind="person", position=free_seat(seats))
         self._show(self._bus.now())
         self._perceived.tell(ActorFound(actor=person, at=self._bus.stamp(at)))
+
+    def _let_go(self, *people: str) -> None:
+        """Let those of these people leave whom this service has brought into the world."""
+        gone = [person for person in people if self._own.pop(person, None) is not None]
+        if gone:
+            self._show(self._bus.now())
+            self._perceived.tell(*(ActorLost(actor=person, at=self._bus.stamp()) for person in gone))
 
     def _show(self, now: Seconds) -> None:
         self._bus.publish(keys.WORLD, World(entities=self._world.tell(self._own.values(), now), at=self._bus.stamp()))

@@ -75,7 +75,8 @@ class VoiceEar:
         self._judge = judge
         self._pause = ceil(pause / LENGTH - 1e-9)
         self._rest: Samples = np.zeros(0, np.int16)
-        self._rest_at: Seconds = 0.0
+        self._rest_at: Seconds | None = None
+        """Time of the first sample of the rest, or of the next one that is to come; None: of any."""
         self._before: deque[Samples] = deque(maxlen=BEFORE)
         self._since: Seconds | None = None
         """Onset of the voice that goes on."""
@@ -89,7 +90,7 @@ class VoiceEar:
     def feed(self, samples: Samples, at: Seconds) -> list[VoiceEvent]:
         """Take the next piece of sound. at: loop time at which its first sample was captured."""
         told: list[VoiceEvent] = []
-        if len(self._rest) and abs(at - self._rest_at - len(self._rest) / RATE) > JUMP:
+        if self._rest_at is not None and abs(at - self._rest_at - len(self._rest) / RATE) > JUMP:
             told += self.lose()
         self._rest = np.concatenate([self._rest, samples])
         begin = at + (len(samples) - len(self._rest)) / RATE  # by the newest piece: clocks drift
@@ -102,7 +103,7 @@ class VoiceEar:
 
     def lose(self) -> list[VoiceEvent]:
         """Take note that no more sound comes for now. A voice that goes on has ended with what was heard of it."""
-        self._rest = self._rest[:0]
+        self._rest, self._rest_at = self._rest[:0], None
         self._before.clear()
         return self._ended(self._clear)
 
