@@ -22,6 +22,7 @@ from engage_hri.services.runtime.installation import extra_command
 FAMILIES: dict[str, dict[str, str]] = {
     "look": {
         "demo": "Watch a robot and a person make a tangram: everything in this one process.",
+        "talk": "Talk with a robot: voice, ears and a manager of a few rules, in the browser or on devices.",
         "watch": "Follow a running system: connection events, the open ones first, feedback, claims on the head, "
         "as they come.",
         "console": "Show a running robot in the browser: the scene in 3D, lanes of events and behaviors, the "
@@ -36,7 +37,6 @@ FAMILIES: dict[str, dict[str, str]] = {
         "doctor": "Tell who sees whom, what is wrong, and what to do. Exit 1 if something is wrong.",
     },
     "talk": {
-        "talk": "Talk with a robot: voice, ears and a manager of a few rules, in a tab of the browser or on devices.",
         "play": "Perform turn fragments and BML blocks. Exit 0 done, 2 input refused, 3 failed while running.",
         "steer": "Hold what a running robot performs, let it continue, or stop it; begin a condition of a study. "
         "Exit 2 if it is not being performed.",

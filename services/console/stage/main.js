@@ -165,6 +165,7 @@ function hint(now) {
   const next = visit(now - idle, { seated: true, kiosk: isKiosk, touched });
   const tips = text.tips(talk.hears, bar.isHeard);
   if (next.do === "tip" && met?.text !== "looking") return tips[next.number % tips.length];
+  if (met?.text === "looking" && talk.hears && !bar.isHeard) return tips[0];
   if (met) return typeof text[met.text] === "function" ? text[met.text](thing(met.about)) : text[met.text];
   return tips[0];
 }

@@ -5,6 +5,7 @@ const RATE = 16000;
 const HEADER = 12; // bytes: the instant, and the number of the frame
 const FULL = RATE * 2; // bytes that may wait for the link: a second of sound; what comes then is lost
 const SILENT = 1500; // ms without any sound from the microphone, or any word from the window, after which something is wrong
+const LATELY = 5000; // ms for which it is told that sound was lost
 const LOOK = 250; // ms between two looks at how it goes
 const LAG = 8; // windows of sound, a quarter of a second, of which the one that came quickest says how the clocks of context and page stand
 
@@ -41,7 +42,7 @@ export function microphone(session, face) {
   const failed = (reason) => off((words) => words.off(reason(words)));
 
   async function begin() {
-    const own = (on = { number: 0, lost: 0, lags: [], heard: performance.now() });
+    const own = (on = { number: 0, lost: 0, lostAt: -Infinity, lags: [], heard: performance.now() });
     tell((words) => words.asks);
     let stream;
     try {
@@ -103,6 +104,7 @@ export function microphone(session, face) {
     own.number += 1;
     if (own.link.socket.readyState !== WebSocket.OPEN || own.link.socket.bufferedAmount > FULL) {
       own.lost += samples.length / RATE;
+      own.lostAt = here;
       return;
     }
     const message = new ArrayBuffer(HEADER + samples.byteLength);
@@ -118,7 +120,7 @@ export function microphone(session, face) {
     if (track.readyState === "ended") off(GONE);
     else if (here - own.heard > SILENT) tell((words) => words.silent);
     else if (here - own.link.answered() > SILENT) tell((words) => words.unanswered);
-    else if (own.lost) tell((words) => words.slow(own.lost.toFixed(1)));
+    else if (here - own.lostAt < LATELY) tell((words) => words.slow(own.lost.toFixed(1)));
     else tell(track.muted ? (words) => words.muted : null);
   }
 

