@@ -32,10 +32,10 @@ STAGE = rb"the stage[^:]*: (http://[^\s]+)"
 PERSON = "window.stage.state.person"
 READY = "window.stage?.state.scene?.body && !document.querySelector('.sit').getAttribute('aria-disabled')"
 SAID = (
-    "hello", "i am fine", "what is your name", "how old are you", "can you hear me", "what can you do",
-    "where is the blue square", "what is on the table", "the red one", "tell me a joke", "i like you", "how are you",
-    "no thank you", "please help me", "show me the red square", "make me laugh", "yes please", "who are you",
-    "thank you very much", "goodbye",
+    "hello robot", "i am fine", "what is your name", "how old are you", "can you hear me", "what can you do",
+    "where is the blue square", "what is on the table", "the red one", "tell me a joke", "i like you", "do you hear me",
+    "no thank you", "please help me", "show me the red square", "make me laugh", "yes please", "what are these",
+    "the blue one", "i have to go now",
 )  # fmt: skip
 """What the visitor says, one after the other."""
 FIRST = 7.5
@@ -133,7 +133,7 @@ async def talked(folder: Path, phrases: tuple[str, ...], pictures: Path | None =
 
 
 def _is_final(message: dict[str, Any]) -> bool:
-    return message["type"] == "utterance" and message.get("final", True) and bool(message["text"])
+    return message["type"] == "utterance" and message.get("final", True)
 
 
 def _answers(told: list[dict[str, Any]]) -> list[list[str]]:

@@ -113,6 +113,27 @@ async def test_a_page_plays_what_the_voice_tells_at_instants_of_the_windows_cloc
         assert not place.robot.is_heard(keys.ROBOT_SOUND)
 
 
+async def test_a_page_whose_microphone_nobody_hears_is_told_what_to_start_and_to_install(
+    hub: MemoryHub, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with window(hub) as place:
+        place.seated["s"] = Seated("ann")
+        page = await place.microphone("s")
+        page.text('{"asked": 1}')
+        await asyncio.sleep(0.1)
+        monkeypatch.setattr(sounds, "find_spec", lambda name: None)
+        page.text('{"asked": 2}')
+        await asyncio.sleep(0.1)
+        hub.join("hearing", "perception").subscribe(keys.ANY_SOUND)
+        page.text('{"asked": 3}')
+        await asyncio.sleep(0.1)
+
+    told = [each.get("unheard", "") for each in page.got]
+    assert "start `engage run hearing --from page`" in told[0]
+    assert "[hearing]" in told[1]
+    assert told[2] == ""
+
+
 async def test_sound_of_a_microphone_is_that_of_the_person_at_the_page(hub: MemoryHub) -> None:
     async with window(hub) as place:
         place.seated["s"] = Seated("ann")

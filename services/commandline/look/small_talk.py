@@ -12,10 +12,10 @@ from engage_hri import EngageError, Robot, connect
 
 RULES = {
     # what somebody says, in any of these forms, and what the robot answers; a thing in brackets it shows
-    ("hello", "good morning"): "Hello! How are you?",
+    ("hello robot", "hello", "good morning"): "Hello! How are you?",
     ("i am fine", "very well thank you"): "I am glad to hear that.",
     ("i am tired", "not so good"): "I am sorry. Stay with me for a while.",
-    ("how are you",): "I am well, thank you.",
+    ("how are you", "are you well"): "I am well, thank you.",
     ("what is your name", "who are you"): "I am a robot, and I have no name yet.",
     ("how old are you",): "I began a few minutes ago.",
     ("what can you do", "please help me"): "I listen, I look, and I point. Ask me where the blue square is.",
@@ -28,7 +28,7 @@ RULES = {
     ("yes please",): "Then ask me something.",
     ("no thank you",): "As you like.",
     ("thank you very much",): "You are welcome.",
-    ("goodbye", "see you later"): "Goodbye! It was nice to talk with you.",
+    ("goodbye", "i have to go now"): "Goodbye! It was nice to talk with you.",
 }
 OTHERWISE = "I did not understand that. Ask me what I can do."
 SILENCE = (

@@ -25,7 +25,7 @@ from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline.embedding import services
 from engage_hri.services.commandline.look.window import web, windowed
 from engage_hri.services.commandline.shell.failing_output import complain
-from engage_hri.services.commandline.shell.options import Embodied, Shown, Written
+from engage_hri.services.commandline.shell.options import Embodied, Hearing, Shown, Written
 from engage_hri.services.commandline.shell.outputs import Outputs
 from engage_hri.services.commandline.shell.process import DONE, run_until_signal
 from engage_hri.services.commandline.shell.roster import ROBOT, SENSES, complete
@@ -33,6 +33,7 @@ from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.console.follow import following
 from engage_hri.services.console.terminal.live import scene_view
 from engage_hri.services.control.bases.error_place import seen_at, words_of
+from engage_hri.services.perception.hearing.microphone import PAGE
 from engage_hri.services.runtime.installation import extra_command
 from engage_hri.services.runtime.service import running
 
@@ -42,7 +43,7 @@ LAST_WORDS: Seconds = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Written, Embodied, Shown):
+class Options(Written, Embodied, Hearing, Shown):
     """Options of the command. window: None: unless the sound is that of a device, or of a file."""
 
     manager: Annotated[
@@ -53,23 +54,9 @@ class Options(Written, Embodied, Shown):
             show_default="a few rules",
         ),
     ] = None
-    source: Annotated[
-        str | None,
-        typer.Option(
-            "--from",
-            metavar="SOURCE",
-            help="Hear this, and not the page: auto for the microphone here, a program that records, a WAV file.",
-        ),
-    ] = None
     window: Annotated[
         bool | None, typer.Option(help="Talk in the browser; with --from it is not.", show_default=False)
     ] = None
-
-    @property
-    def overrides(self) -> tuple[str, ...]:
-        """Settings of the options, which are stronger than `--set`."""
-        own = (f"hearing.source={json.encode(self.source).decode()}",) if self.source else ()
-        return (*super().overrides, *own)
 
 
 @dataclass(frozen=True)
@@ -128,7 +115,7 @@ def _defaults(manager: ManagerFile, has_window: bool) -> Iterator[str]:
         yield "control.voice=espeak"
     if has_window:
         yield "control.drivers.espeak.device=none"
-        yield "hearing.source=page"
+        yield f"hearing.source={PAGE}"
     if _has("pocketsphinx") and manager.phrases:
         yield "hearing.recognizer=sphinx"
         yield f"hearing.phrases={json.encode(manager.phrases).decode()}"

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import typer
-from msgspec import json
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.bus.interface import Hub
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.failing_output import complain
-from engage_hri.services.commandline.shell.options import Embodied, Listening
+from engage_hri.services.commandline.shell.options import Embodied, Hearing, Listening
 from engage_hri.services.commandline.shell.process import (
     DONE,
     end_after_the_parent,
@@ -27,7 +26,7 @@ from engage_hri.services.runtime.service import Service, running
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Embodied, Listening):
+class Options(Embodied, Hearing, Listening):
     """Options of the command. attended: run only until standard input closes, as it does when our parent dies."""
 
     services: Annotated[
@@ -39,17 +38,7 @@ class Options(Embodied, Listening):
             autocompletion=lambda: list(roster.NAMES),
         ),
     ]
-    source: Annotated[
-        str | None,
-        typer.Option("--from", metavar="SOURCE", help="Of hearing: a WAV file, or a program that records (arecord)."),
-    ] = None
     attended: Annotated[bool, typer.Option("--attended", hidden=True)] = False
-
-    @property
-    def overrides(self) -> tuple[str, ...]:
-        """Settings of the options, which are stronger than `--set`."""
-        own = (f"hearing.source={json.encode(self.source).decode()}",) if self.source else ()
-        return (*super().overrides, *own)
 
 
 def ready_line(name: str) -> str:

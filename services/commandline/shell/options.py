@@ -119,6 +119,28 @@ class Embodied(Configured):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Hearing(Configured):
+    """Options for the robot's ears."""
+
+    source: Annotated[
+        str | None,
+        typer.Option(
+            "--from",
+            metavar="SOURCE",
+            help="What hearing hears: page, the microphones of the pages of windows; a program that records "
+            "(arecord); a WAV file.",
+            show_default=False,
+        ),
+    ] = None
+
+    @property
+    def overrides(self) -> tuple[str, ...]:
+        """Settings of the options, which are stronger than `--set`."""
+        own = (f"hearing.source={json.encode(self.source).decode()}",) if self.source else ()
+        return (*super().overrides, *own)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Connected(Configured):
     """Options for the robot and the bus. Without endpoints the bus is that of this machine."""
 

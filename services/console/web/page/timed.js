@@ -12,6 +12,7 @@ export function timed(address, { ready = () => {}, heard = () => {}, ended }) {
   const answers = []; // how far the window's clock is ahead of ours, and how long the answer took, in seconds
   const timers = [];
   let answered = performance.now();
+  let unheard = "";
   const ask = () => socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify({ asked: performance.now() / 1000 }));
   socket.onopen = () => {
     for (const at of ASKED) timers.push(setTimeout(ask, at));
@@ -21,7 +22,8 @@ export function timed(address, { ready = () => {}, heard = () => {}, ended }) {
     if (typeof data !== "string") return heard(data);
     answered = performance.now();
     const here = answered / 1000;
-    const { asked, now } = JSON.parse(data);
+    const { asked, now, unheard: reason = "" } = JSON.parse(data);
+    unheard = reason;
     answers.push({ ahead: now - (asked + here) / 2, took: here - asked });
     if (answers.length > KEPT) answers.shift();
     if (answers.length === 1) ready();
@@ -36,6 +38,7 @@ export function timed(address, { ready = () => {}, heard = () => {}, ended }) {
     // Seconds of the window's clock for a time of ours in ms, and the other way; null: it is not known yet.
     there: (ms) => (ahead() === null ? null : ms / 1000 + ahead()),
     here: (seconds) => (ahead() === null ? null : (seconds - ahead()) * 1000),
+    unheard: () => unheard, // why nobody hears what is sent
     answered: () => answered, // when the window answered last, in ms
     close() {
       ended = null;
