@@ -33,9 +33,9 @@ PERSON = "window.stage.state.person"
 READY = "window.stage?.state.scene?.body && !document.querySelector('.sit').getAttribute('aria-disabled')"
 SAID = (
     "hello robot", "i am fine", "what is your name", "how old are you", "can you hear me", "what can you do",
-    "where is the blue square", "what is on the table", "the red one", "tell me a joke", "i like you", "do you hear me",
-    "no thank you", "please help me", "show me the red square", "make me laugh", "yes please", "what are these",
-    "the blue one", "i have to go now",
+    "where is the blue square", "what is on the table", "the blue one", "make me laugh", "i like you",
+    "do you hear me", "no thank you", "please help me", "show me the red square", "yes please", "what are these",
+    "the red one", "thank you very much", "i have to go now",
 )  # fmt: skip
 """What the visitor says, one after the other."""
 FIRST = 7.5

@@ -78,7 +78,10 @@ async def fits(page: Page) -> None:
 COUNTS = """
 window.asked = 0;
 const asks = navigator.mediaDevices.getUserMedia.bind(navigator.mediaDevices);
-navigator.mediaDevices.getUserMedia = async (what) => { window.asked += 1; return (window.stream = await asks(what)); };
+navigator.mediaDevices.getUserMedia = async (what) => {
+  window.asked += 1;
+  return (window.stream = await asks(what));
+};
 """
 
 
