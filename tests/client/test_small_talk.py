@@ -1,14 +1,21 @@
 """The manager of a few rules: whom it greets, what it answers, and what becomes of who says nothing or goes."""
 
 import asyncio
+import re
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from engage_hri import embedded, perceive
 from engage_hri.services.commandline.embedding import EmbeddedRobot
 from engage_hri.services.commandline.look.small_talk import OTHERWISE, PHRASES, RULES, SILENCE, answer, talk
+from engage_hri.services.commandline.look.talk import RULES as RULES_FILE
+
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "talk.md").read_text(encoding="utf-8")
 
 
 class Talk:
@@ -92,3 +99,23 @@ def test_each_phrase_has_its_own_answer_also_among_other_words(phrase: str) -> N
 
 def test_what_it_does_not_know_it_says() -> None:
     assert answer("Do you like the sea?") == OTHERWISE
+
+
+async def test_the_manager_that_the_page_shows_asks_and_hears(capsys: pytest.CaptureFixture[str]) -> None:
+    [code] = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(code, names)
+    async with embedded(human="none") as robot, perceive("ann", hub=robot.hub) as ann:
+        await ann.look_at(ann.robot)
+        talking = asyncio.create_task(names["talk"](robot))
+        await asyncio.sleep(4)
+        await ann.say(names["PHRASES"][0])
+        await talking
+
+    assert capsys.readouterr().out == "ann has said: tell me more\n"
+
+
+def test_the_table_that_the_page_shows_is_that_of_the_file() -> None:
+    [table] = re.findall(r"^```text\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    lines = RULES_FILE.read_text(encoding="utf-8").splitlines()
+    assert [line for line in table.splitlines() if line not in lines] == []

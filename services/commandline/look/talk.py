@@ -23,7 +23,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline.embedding import services
-from engage_hri.services.commandline.look.window import web, windowed
+from engage_hri.services.commandline.look.window import can_open, web, windowed
 from engage_hri.services.commandline.shell.failing_output import complain
 from engage_hri.services.commandline.shell.options import Embodied, Hearing, Shown, Written
 from engage_hri.services.commandline.shell.outputs import Outputs
@@ -143,7 +143,7 @@ async def _talk(
         with scene_view(console, config.robot, began, live=False) as show:
             async with (
                 following(bus, (show, outputs)),
-                windowed(hub, shown, began, tell) if shown else nullcontext(),
+                windowed(hub, shown, began, tell, opens=can_open(console.is_terminal)) if shown else nullcontext(),
                 running(hub, services(config, *names)) as over,
                 connect(hub=hub, name="manager") as robot,
             ):
