@@ -14,7 +14,6 @@ from engage_hri.services.commandline.embedding import EmbeddedRobot
 from engage_hri.services.commandline.look.small_talk import OTHERWISE, PHRASES, RULES, SILENCE, answer, talk
 from engage_hri.services.commandline.look.talk import RULES as RULES_FILE
 
-
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "talk.md").read_text(encoding="utf-8")
 
 
