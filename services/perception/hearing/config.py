@@ -16,8 +16,8 @@ class HearingConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """Ids of those who speak, one for each channel of the sound; empty: there is one channel, and who speaks is the
     only person in the world, or else `visitor`. Of a page it is who sits there, and this is left out."""
     is_deaf_while_robot_speaks: bool | None = None
-    """Whether nothing is heard while the robot's voice sounds, since it cannot be told from a person's. Without a
-    value: yes for sound that is recorded now, no for a file."""
+    """Whether nothing is heard while the robot's voice sounds. No: what the sound has of it is taken for a person's.
+    Without a value it is taken out of sound that is recorded now, and left in a file."""
     pause: Seconds = 0.3
     """Silence that ends a speech."""
     recognizer: str = ""

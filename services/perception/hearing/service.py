@@ -6,6 +6,7 @@ back when they are known. Where a recognizer is at work, an utterance without wo
 
 import asyncio
 import time
+from collections import deque
 from collections.abc import AsyncGenerator, Callable, Iterable
 from contextlib import aclosing
 from itertools import count
@@ -34,6 +35,7 @@ from engage_hri.services.client.people.shared_world import SharedWorld
 from engage_hri.services.perception.hearing.config import HearingConfig
 from engage_hri.services.perception.hearing.listening import InItsOwn, InThisProcess, Order, Understanding
 from engage_hri.services.perception.hearing.microphone import PAGE, SILENT, SoundLost, is_file, opened
+from engage_hri.services.perception.hearing.own_voice import VAIN, Canceller, CautiousJudge, OwnVoice
 from engage_hri.services.perception.hearing.recognizing import Answer, KnownWords, SpeechWords, settings_of
 from engage_hri.services.perception.hearing.sound import Piece
 from engage_hri.services.perception.hearing.voice import (
@@ -56,6 +58,8 @@ LOOK_AROUND: Seconds = 0.5
 """Time in which the world, if anybody tells it, is known."""
 AGAIN: Seconds = 2.0
 """Time after which a device is tried again that gave no sound."""
+BEFORE_SPEECH: Seconds = 1.0
+"""Time before the robot speaks from which on sound of its voice is that of this speech."""
 ECHO: Seconds = 0.2
 """Time for which the robot's voice goes on in the room, and in the devices, when it has ended."""
 LAST_WORDS: Seconds = 25.0
@@ -76,7 +80,8 @@ async def hear(bus: Bus, ready: Ready, config: HearingConfig) -> None:
     Raises InputRefused: there is no such sound or recognizer, or a package is not installed.
     """
     pages = (keys.ANY_SOUND,) if config.source == PAGE else ()
-    with bus.subscribe(keys.ANY_ROBOT_ALIVE, keys.WORLD, keys.ROBOT_ACTION, *pages) as inbox:
+    own = (keys.ROBOT_SOUND,) if is_cancelling(config) else ()
+    with bus.subscribe(keys.ANY_ROBOT_ALIVE, keys.WORLD, keys.ROBOT_ACTION, *pages, *own) as inbox:
         tell_settings(bus, "hearing", config)
         hearing = _Hearing(bus, config)
         try:
@@ -89,6 +94,11 @@ async def hear(bus: Bus, ready: Ready, config: HearingConfig) -> None:
             hearing.close()
 
 
+def is_cancelling(config: HearingConfig) -> bool:
+    """Tell whether the robot's own voice is taken out of the sound: where it is recorded now, unless it is set."""
+    return config.is_deaf_while_robot_speaks is None and not is_file(config.source)
+
+
 class _Speech:
     """A speech that goes on, or whose words are awaited. number: for the recognizer."""
 
@@ -99,20 +109,23 @@ class _Speech:
 class _Channel:
     """A channel of sound. person: whose voice is in it; empty: that of the only person who is here.
 
-    voice: what is being said; None also of a voice that is nobody's.
+    voice: what is being said; None also of a voice that is nobody's. canceller, judge: None: the robot's own voice
+    stays in it.
     """
 
-    def __init__(self, person: str, pause: Seconds) -> None:
+    def __init__(self, person: str, pause: Seconds, own: OwnVoice | None) -> None:
         self.person = person
-        self.ear = VoiceEar(silero(), pause)
+        self.canceller = None if own is None else Canceller(own)
+        self.judge = None if self.canceller is None else CautiousJudge(silero(), self.canceller)
+        self.ear = VoiceEar(self.judge or silero(), pause)
         self.voice: _Speech | None = None
 
 
 class _PageChannel(_Channel):
     """The microphone of a page. number: of the last frame. came: loop time of its arrival. lossy: that of a loss."""
 
-    def __init__(self, person: str, pause: Seconds, number: int) -> None:
-        super().__init__(person, pause)
+    def __init__(self, person: str, pause: Seconds, own: OwnVoice | None, number: int) -> None:
+        super().__init__(person, pause, own)
         self.number, self.came, self.lossy = number, 0.0, float("-inf")
 
 
@@ -123,6 +136,7 @@ class _Hearing:
         """Raises InputRefused: there is no such source or recognizer, or a package is not installed."""
         self._bus, self._config = bus, config
         people = config.people or ("",)
+        self._own_voice = OwnVoice() if is_cancelling(config) else None
         self._pages: dict[str, _PageChannel] = {}
         """Channels of pages, by person."""
         self._channels: list[_Channel] = []
@@ -133,7 +147,7 @@ class _Hearing:
             raise InputRefused(Fault(reason=str(error), where="hearing", advice=extra_command("hearing"))) from error
         if config.source != PAGE:
             self._sound: Callable[[], AsyncGenerator[Piece, None]] = opened(config.source, len(people))
-            self._channels = [_Channel(person, config.pause) for person in people]
+            self._channels = [_Channel(person, config.pause, self._own_voice) for person in people]
         self._world, self._perceived = SharedWorld(bus.name), PerceivedActions(bus)
         self._own: dict[str, Entity] = {}
         """The people whom this service has brought into the world, since nobody else tells of them."""
@@ -141,11 +155,12 @@ class _Hearing:
         """Speeches whose words are not known for good, by number."""
         self._all_known = asyncio.Event()
         self._numbers = count(1)
-        self._robot_speaks_until: Seconds | None = None
-        is_deaf = config.is_deaf_while_robot_speaks
-        self._is_deaf = not is_file(config.source) if is_deaf is None else is_deaf
-        self._told: set[str] = set()
-        """Reasons of faults that were told and have not passed."""
+        self._robot_speaks = float("-inf"), float("-inf")
+        """Since when the robot speaks, or has spoken last, and until when."""
+        self._told: deque[str] = deque(maxlen=16)
+        """Reasons of the faults that were told last, each once."""
+        self._is_lost = False
+        """No sound comes from the device, which was told."""
         self.recognizer = self._understanding()
 
     def _understanding(self) -> Understanding | None:
@@ -181,8 +196,8 @@ class _Hearing:
 
     async def _hear(self, inbox: Subscription, sound: AsyncGenerator[Piece, None]) -> None:
         async for piece in sound:
-            if self._told:
-                self._told.clear()
+            if self._is_lost:
+                self._is_lost = False
                 journal.alert(self._bus.log, "hearing again")
             while len(inbox):
                 received = await inbox.next()
@@ -221,7 +236,7 @@ class _Hearing:
                     reason = f"no sound comes any more from the microphone of {page.person}"
                     advice = "is the page, or the computer it is on, asleep or cut off?"
                     self._publish(Fault(reason=reason, where=keys.sound(page.person), advice=advice))
-            elif isinstance(received.message, SoundFrame):
+            elif isinstance(received.message, SoundFrame) and received.key != keys.ROBOT_SOUND:
                 with self._bus.containing(received):
                     self._hear_page(received.key.rpartition("/")[2], received.message)
             else:
@@ -256,7 +271,7 @@ class _Hearing:
             self._bus.tell_refused(Fault(reason=reason, where=keys.sound(person)), person)
             return None
         self._bus.log.info("the microphone of %s is on", person)
-        page = self._pages[person] = _PageChannel(person, self._config.pause, number)
+        page = self._pages[person] = _PageChannel(person, self._config.pause, self._own_voice, number)
         return page
 
     def _end(self, page: _PageChannel) -> None:
@@ -269,8 +284,15 @@ class _Hearing:
 
     def _feed(self, channel: _Channel, samples: Samples, at: Seconds) -> None:
         """Let a channel have more sound. at: loop time at which its first sample was captured."""
-        if self._is_deaf and self._robot_speaks(at):
+        if self._is_deaf(at):
             samples = np.zeros_like(samples)
+        if channel.canceller is not None and channel.judge is not None:
+            samples, at = channel.canceller.feed(samples, at)
+            if channel.judge.in_vain > VAIN:
+                reason = "the robot's own voice cannot be taken out of the sound: nobody is heard while it speaks"
+                self._complain(
+                    Fault(reason=reason, where="hearing", advice="use a headset, or the page that plays it")
+                )
         self._tell(channel, channel.ear.feed(samples, at))
 
     def _tell(self, channel: _Channel, events: Iterable[VoiceEvent]) -> None:
@@ -316,17 +338,30 @@ class _Hearing:
             return None
         return here[0] if here else VISITOR
 
-    def _robot_speaks(self, at: Seconds) -> bool:
-        return self._robot_speaks_until is not None and at < self._robot_speaks_until
+    def _is_deaf(self, at: Seconds) -> bool:
+        """True if the robot's voice may be heard at this time, and cannot be told from a person's."""
+        since, until = self._robot_speaks
+        if not since <= at < until:
+            return False
+        if self._own_voice is None:
+            return bool(self._config.is_deaf_while_robot_speaks)
+        if self._own_voice.told >= since - BEFORE_SPEECH:
+            return False
+        reason = "nobody is heard while the robot speaks, for the sound of its voice is not told"
+        advice = "if it makes none, or with a headset: --set hearing.is_deaf_while_robot_speaks=false"
+        self._complain(Fault(reason=reason, where="hearing", advice=advice))
+        return True
 
     def _lose(self, fault: Fault) -> None:
         for channel in self._channels:
             self._tell(channel, channel.ear.lose())
-        self._complain(fault)
+        if not self._is_lost:
+            self._is_lost = True
+            self._publish(fault)
 
     def _complain(self, fault: Fault) -> None:
         if fault.reason not in self._told:
-            self._told.add(fault.reason)
+            self._told.append(fault.reason)
             self._publish(fault)
 
     def _publish(self, fault: Fault) -> None:
@@ -364,10 +399,13 @@ class _Hearing:
             if self._world.take(message, received.source, now) and self._own:
                 self._show(now)
             match message:
-                case ActionBegan(actor=self._bus.robot, action="speak"):
-                    self._robot_speaks_until = float("inf")
+                case ActionBegan(actor=self._bus.robot, action="speak", at=at):
+                    self._robot_speaks = self._bus.local(at), float("inf")
                 case ActionEnded(actor=self._bus.robot, action="speak", at=at):
-                    self._robot_speaks_until = self._bus.local(at) + ECHO
+                    self._robot_speaks = self._robot_speaks[0], self._bus.local(at) + ECHO
+                case SoundFrame() if self._own_voice is not None:
+                    samples = np.frombuffer(message.samples, "<i2")
+                    self._own_voice.take(samples, message.rate, self._bus.local(message.at))
 
     def _bring(self, person: str, at: Seconds) -> None:
         """Bring a person into the world, unless somebody tells of them there."""

@@ -44,29 +44,53 @@ def read_wav(file: BinaryIO, name: str) -> Samples:
     return np.column_stack([resampled(samples[:, channel], rate) for channel in range(channels)])
 
 
-def resampled(samples: Samples, rate: int) -> Samples:
-    """Convert one channel to `RATE`: by a sinc in a cosine window, so that nothing above half the rate folds down.
+class Resampler:
+    """Converts a channel to `RATE`, piece by piece, by a sinc in a cosine window: nothing above half the rate folds
+    down. What it returns lags behind by its `reach`.
 
-    rate: samples per second that it has.
+    reach: samples on each side that it needs.
     """
-    if rate == RATE or not len(samples):
-        return samples.astype(np.int16)
-    cut = min(1.0, RATE / rate)
-    """Share of the frequencies that remain."""
-    reach = int(np.ceil(TAPS / cut))
-    padded = np.pad(samples.astype(np.float64), reach)
-    count = len(samples) * RATE // rate
-    steps = np.arange(-reach + 1, reach + 1)
-    made = []
-    for first in range(0, count, AT_ONCE):
-        places = np.arange(first, min(count, first + AT_ONCE)) * (rate / RATE)
-        whole = places.astype(np.int64)
-        away: NDArray[np.float64] = steps[None, :] - (places - whole)[:, None]
-        window = np.cos(np.clip(away / reach, -1, 1) * (np.pi / 2)) ** 2
-        weights = cut * np.sinc(cut * away) * window
-        made.append((padded[whole[:, None] + steps[None, :] + reach] * weights).sum(axis=1))
-    clipped: Samples = np.clip(np.rint(np.concatenate(made)), -32768, 32767).astype(np.int16)
-    return clipped
+
+    def __init__(self, rate: int) -> None:
+        """rate: samples per second of what comes."""
+        self._rate = rate
+        self._cut = min(1.0, RATE / rate)
+        """Share of the frequencies that remain."""
+        self.reach = int(np.ceil(TAPS / self._cut))
+        self._rest = np.zeros(self.reach)
+        self._first = -self.reach
+        """Number of the first sample of the rest."""
+        self._count = 0
+        """Samples that were returned."""
+
+    def feed(self, samples: Samples) -> Samples:
+        """Convert the next piece."""
+        if self._rate == RATE:
+            return samples.astype(np.int16)
+        self._rest = np.concatenate([self._rest, samples])
+        known = self._first + len(self._rest)
+        count = max(self._count, -((self.reach - known) * RATE // self._rate))  # those whose reach is known
+        steps = np.arange(-self.reach + 1, self.reach + 1)
+        made = [np.zeros(0, np.int16)]
+        for first in range(self._count, count, AT_ONCE):
+            places = np.arange(first, min(count, first + AT_ONCE)) * (self._rate / RATE)
+            whole = places.astype(np.int64)
+            away: NDArray[np.float64] = steps[None, :] - (places - whole)[:, None]
+            window = np.cos(np.clip(away / self.reach, -1, 1) * (np.pi / 2)) ** 2
+            weights = self._cut * np.sinc(self._cut * away) * window
+            summed = (self._rest[whole[:, None] + steps[None, :] - self._first] * weights).sum(axis=1)
+            made.append(np.clip(np.rint(summed), -32768, 32767).astype(np.int16))
+        self._count = count
+        begin = count * self._rate // RATE - self.reach + 1
+        self._rest, self._first = self._rest[max(0, begin - self._first) :], max(begin, self._first)
+        return np.concatenate(made)
+
+
+def resampled(samples: Samples, rate: int) -> Samples:
+    """Convert one channel to `RATE`. rate: samples per second that it has."""
+    resampler = Resampler(rate)
+    made = [resampler.feed(samples), resampler.feed(np.zeros(resampler.reach + 1, np.int16))]
+    return np.concatenate(made)[: len(samples) * RATE // rate]
 
 
 LATE: Seconds = 0.1
