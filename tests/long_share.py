@@ -31,6 +31,7 @@ LONG = {
     "control/test_synthesizer_that_fails.py": "a synthesizer is a process",
     "control/test_voice_outlets.py": "loudspeakers are programs of the system",
     "control/test_told_sound.py": "a synthesizer is a process",
+    "perception/test_own_voice.py": "minutes of sound through a filter and a detector",
     "control/test_voice_recognized.py": "eSpeak NG speaks, and a recognizer listens",
     "control/mujoco/test_described_contract.py": "another robot on the driver that test_mujoco_contract.py has",
     "scenario/test_raw_perception.py": "whole tasks seen by cameras; recognition/ has the parts",

@@ -87,7 +87,9 @@ def scene(
     for at, said in robot:
         played[round(at * RATE) : round(at * RATE) + len(said)] = said
     played = np.interp(np.arange(end) * (1 + drift), np.arange(end), played)
-    sound = np.convolve(played, room(delay, echoes, chance))[:end]
+    way = room(delay, echoes, chance)
+    size = end + len(way)
+    sound = np.fft.irfft(np.fft.rfft(played, size) * np.fft.rfft(way, size), size)[:end]
     level = np.sqrt(np.mean(sound[loud(sound)] ** 2))
     spoken = []
     for at, said in people:
@@ -182,9 +184,11 @@ async def main(minutes: float) -> None:
         alone, off, broken = results
         lags = np.array(broken.lags)
         print(
-            f"{1000 * delay:3.0f} ms, {echoes:.1f} s, {1e6 * drift:2.0f} ppm | {len(alone.false) / alone.minutes:.2f} "
-            f"in {alone.minutes:.1f} min; {len(off.false) / off.minutes:.1f} | {np.mean(lags <= 0.2):.0%} of {len(lags)} "
-            f"within 0.2 s, median {np.median(lags):.3f} s; {len(broken.false) / broken.minutes:.2f} a minute",
+            f"{1000 * delay:3.0f} ms, {echoes:.1f} s, {1e6 * drift:2.0f} ppm | "
+            f"{len(alone.false) / alone.minutes:.2f} in {alone.minutes:.1f} min; "
+            f"{len(off.false) / off.minutes:.1f} | "
+            f"{np.mean(lags <= 0.2):.0%} of {len(lags)} within 0.2 s, median {np.median(lags):.3f} s; "
+            f"{len(broken.false) / broken.minutes:.2f} a minute",
             flush=True,
         )
 

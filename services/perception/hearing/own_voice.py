@@ -26,6 +26,9 @@ JITTER = 64
 """Samples by which instants may waver before the voice is set to them again: 4 ms."""
 KEPT = 1 << 16
 """Samples of the voice that are remembered: 4 s."""
+FALL, FAINT, SURE = 0.8, 0.02, 16
+"""Share of its level that a voice keeps in a step of silence, the level from which on it is loud, and the steps for
+which it has to be: by then it is in the room, 0.2 s after `LEAD`."""
 TRUSTED, MOST_TRUST = 15, 60
 """Trust from which on the filter is believed, and the most. Silence where the robot's voice was adds 1 a window."""
 COST = 5
@@ -76,13 +79,15 @@ class OwnVoice:
 class Canceller:
     """What takes the robot's voice out of one microphone.
 
-    sounds: whether the voice was to be heard in the last piece, or its echo.
+    sounds: whether the voice was to be heard in the last piece, or its echo. is_sure: it was, and is not over yet.
     """
 
     def __init__(self, voice: OwnVoice) -> None:
         """voice: that of the robot."""
-        self.sounds = False
+        self.sounds = self.is_sure = False
         self._voice = voice
+        self._level, self._loud = 0.0, 0
+        """Of the voice, falling slowly; and for how many steps it has been loud."""
         self._rest: Samples = np.zeros(0, np.int16)
         self._next: int | None = None
         """Number of the sample of the voice with which it goes on."""
@@ -119,6 +124,9 @@ class Canceller:
         self._spectra[0] = np.fft.rfft(np.concatenate([self._before, voice]))
         self._before = voice
         self.sounds = bool(self._spectra.any())
+        self._level = max(FALL * self._level, float(np.abs(voice).max()))
+        self._loud = self._loud + 1 if self._level > FAINT else 0
+        self.is_sure = self._loud > SURE
         if not self.sounds:
             return heard
         left = heard - np.fft.irfft((self._ways * self._spectra).sum(axis=0))[STEP:]
@@ -156,7 +164,7 @@ class CautiousJudge:
             return likely
         is_trusted = self._trust >= TRUSTED
         self.in_vain = 0.0 if is_trusted else self.in_vain + LENGTH
-        if likely < MAYBE:
+        if likely < MAYBE and self._canceller.is_sure:
             self._trust = min(MOST_TRUST, self._trust + 1)
         elif 0 < self._count <= ENOUGH or (self._count and not is_trusted):
             self._trust = max(0, self._trust - COST)
