@@ -1,7 +1,7 @@
 """Talks with `engage talk` from sound alone: a browser has a spoken file for its microphone, and what its page plays
 is recorded, and heard by a recognizer that knows nothing but all answers.
 
-    python -m tests.console.talked [EXCHANGES]
+    python -m tests.console.talked [EXCHANGES [FOLDER]]        # FOLDER: for pictures of the page, a series
 """
 
 import asyncio
@@ -163,20 +163,19 @@ def _exchanges(phrases: tuple[str, ...], told: list[dict[str, Any]], begin: floa
         part = sound[max(0, round((since - begin) * RATE)) : round((until - begin) * RATE)]
         loud = np.flatnonzero(np.abs(part) > LOUD * 32767)
         listening = listener.listen()
-        listening.hear(part[max(0, loud[0] - RATE // 4) : loud[-1] + RATE // 4])
+        first, last = (loud[0], loud[-1]) if len(loud) else (0, 0)
+        listening.hear(part[max(0, first - RATE // 4) : last + RATE // 4])
         found.append(
             Exchange(
                 phrase, message["text"], pairs.get(message["text"], ""), plain(" ".join(answers)),
-                listening.end().text, loud[0] / RATE,
+                listening.end().text, first / RATE,
             )
         )  # fmt: skip
     return found
 
 
-def _main(count: int) -> None:
+def _main(count: int, pictures: Path | None) -> None:
     with TemporaryDirectory() as folder:
-        pictures = Path("build/talked")
-        pictures.mkdir(parents=True, exist_ok=True)
         try:
             found = asyncio.run(talked(Path(folder), SAID[:count], pictures))
         finally:
@@ -193,4 +192,4 @@ def _main(count: int) -> None:
 
 
 if __name__ == "__main__":
-    _main(int(sys.argv[1]) if len(sys.argv) > 1 else len(SAID))
+    _main(int(sys.argv[1]) if len(sys.argv) > 1 else len(SAID), Path(sys.argv[2]) if len(sys.argv) > 2 else None)

@@ -162,3 +162,13 @@ async def test_what_is_said_is_answered_by_what_is_heard(tmp_path: Path) -> None
 
     assert [each for each in found if not each.is_right] == []
     assert max(each.delay for each in found) < 4.0
+
+
+async def test_a_demo_for_visitors_with_a_voice_hears_them(tmp_path: Path, place: Talking) -> None:
+    silent = ("--voice", "espeak", "--set", "control.drivers.espeak.device=none")
+    with engage(tmp_path / "demo", "demo", "--you", *silent, BROWSER="true %s") as demo:
+        async with seated(Talking(waited(demo, tmp_path / "demo", STAGE), place.port)) as page:
+            await press(page, ".hold")
+            await page.until(LIGHT, 20)
+            own = "window.stage.state.scene.people.find((each) => each.id === window.stage.state.person)"
+            await page.until(f"{own}.speaks", 30)

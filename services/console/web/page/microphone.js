@@ -3,7 +3,7 @@ import { timed } from "./timed.js";
 
 const RATE = 16000;
 const HEADER = 12; // bytes: the instant, and the number of the frame
-const FULL = RATE * 2; // bytes that may wait for the link: a second of sound; what comes then is lost
+const FULL = 3 * RATE * 2; // bytes that may wait for the link: 3 s of sound, as while the page draws; what comes then is lost
 const SILENT = 1500; // ms without any sound from the microphone, or any word from the window, after which something is wrong
 const LATELY = 5000; // ms for which it is told that sound was lost
 const LOOK = 250; // ms between two looks at how it goes
