@@ -9,7 +9,7 @@ import re
 import sys
 import time
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
@@ -76,15 +76,21 @@ def spoken_answer(phrase: str) -> str:
     return plain(re.sub(r"\[(\w+)-(\w+)\]", r"the \1 \2", answer(phrase)))
 
 
+def places(phrases: tuple[str, ...]) -> list[float]:
+    """Seconds at which each phrase begins, and at which all is over."""
+    found = [FIRST]
+    for phrase in phrases:
+        spoken = len(voice(phrase, "f3")) + len(voice(spoken_answer(phrase)))
+        found.append(found[-1] + spoken / RATE + PAUSE)
+    return found
+
+
 def spoken_file(path: Path, phrases: tuple[str, ...]) -> Path:
     """Write what a microphone hears: the phrases, with pauses, in a quiet room."""
-    at, said = FIRST, []
-    for phrase in phrases:
-        said.append((at, voice(phrase, "f3")))
-        at += (len(voice(phrase, "f3")) + len(voice(spoken_answer(phrase)))) / RATE + PAUSE
-    samples = placed(said, at + 5.0).astype(np.float64) + np.random.default_rng(4).normal(
-        0.0, 12.0, round((at + 5.0) * RATE)
-    )
+    *starts, end = places(phrases)
+    said = [(at, voice(phrase, "f3")) for at, phrase in zip(starts, phrases, strict=True)]
+    samples = placed(said, end + 5.0).astype(np.float64)
+    samples += np.random.default_rng(4).normal(0.0, 12.0, len(samples))
     return write_wav(path, samples.astype(np.int16))
 
 
@@ -121,12 +127,15 @@ async def talked(folder: Path, phrases: tuple[str, ...], pictures: Path | None =
             await page.until("window.stage.state.talk.hears", 30)
             await press(page, ".hold")
             await page.until("document.querySelector('.hold.light')", 20)
-            async with asyncio.timeout(FIRST + len(phrases) * 15.0 + 20.0):
-                while sum(len(each) > 0 for each in _answers(told)) < len(phrases):
-                    told.append(await socket.receive_json())
+            until = asyncio.get_running_loop().time() + places(phrases)[-1] + 4.0
+            with suppress(TimeoutError):
+                while True:
+                    left = until - asyncio.get_running_loop().time()
+                    told.append(await socket.receive_json(timeout=max(0.1, left)))
                     if pictures is not None and _is_final(told[-1]):
                         (pictures / f"{len(told):04}.png").write_bytes(await page.picture(whole=False))
-            await asyncio.sleep(3.0)
+                    if left < 0:
+                        break
         begin, sound, rate = await tapped(page, time.monotonic())
         assert page.errors == []
     return _exchanges(phrases, told, begin, resampled((32767 * sound).astype(np.int16), rate))
@@ -136,19 +145,13 @@ def _is_final(message: dict[str, Any]) -> bool:
     return message["type"] == "utterance" and message.get("final", True)
 
 
-def _answers(told: list[dict[str, Any]]) -> list[list[str]]:
-    """For each thing that was said: what the robot has said until the next one."""
-    found: list[list[str]] = []
-    for message in told:
-        if _is_final(message):
-            found.append([])
-        elif message["type"] == "fragment_outcome" and found:
-            found[-1].append(" ".join(each["text"] for each in message.get("spoken", ())))
-    return found
+def _said_by_the_robot(told: list[dict[str, Any]]) -> str:
+    spoken = [each for message in told if message["type"] == "fragment_outcome" for each in message.get("spoken", ())]
+    return plain(" ".join(each["text"] for each in spoken))
 
 
 def _exchanges(phrases: tuple[str, ...], told: list[dict[str, Any]], begin: float, sound: Samples) -> list[Exchange]:
-    heard = [message for message in told if _is_final(message)]
+    finals = [index for index, message in enumerate(told) if _is_final(message)]
     pairs = {
         message["words"]: message["initiator"]
         for message in told
@@ -156,21 +159,23 @@ def _exchanges(phrases: tuple[str, ...], told: list[dict[str, Any]], begin: floa
         and message["state"] in ("succeeded", "completed") and message.get("words")
     }  # fmt: skip
     listener = Sphinx(RecognizerSettings(phrases=tuple({spoken_answer(each) for each in SAID})))
-    ends = [message["ended"][1] for message in heard]
-    starts = [message["began"][1] for message in heard[1:]] + [begin + len(sound) / RATE]
+    *starts, end = [told[finals[0]]["began"][1] + place - FIRST for place in places(phrases)]
     found = []
-    for phrase, message, answers, since, until in zip(phrases, heard, _answers(told), ends, starts, strict=True):
-        part = sound[max(0, round((since - begin) * RATE)) : round((until - begin) * RATE)]
+    for phrase, start, following in zip(phrases, starts, [*starts[1:], end + 4.0], strict=True):
+        own = [index for index in finals if start - 1.5 < told[index]["began"][1] < following - 1.5]
+        if not own:
+            found.append(Exchange(phrase, "", "", "", "", 0.0))
+            continue
+        later = [index for index in finals if index > own[-1]]
+        heard = " ".join(told[index]["text"] for index in own).strip()
+        ended = told[own[-1]]["ended"][1]
+        part = sound[max(0, round((ended - begin) * RATE)) : max(0, round((following - begin) * RATE))]
         loud = np.flatnonzero(np.abs(part) > LOUD * 32767)
+        first, last = (int(loud[0]), int(loud[-1])) if len(loud) else (0, 0)
         listening = listener.listen()
-        first, last = (loud[0], loud[-1]) if len(loud) else (0, 0)
         listening.hear(part[max(0, first - RATE // 4) : last + RATE // 4])
-        found.append(
-            Exchange(
-                phrase, message["text"], pairs.get(message["text"], ""), plain(" ".join(answers)),
-                listening.end().text, first / RATE,
-            )
-        )  # fmt: skip
+        said = _said_by_the_robot(told[own[0] : later[0] if later else None])
+        found.append(Exchange(phrase, heard, pairs.get(heard, ""), said, listening.end().text, first / RATE))
     return found
 
 
