@@ -18,6 +18,9 @@ from tests.recognition.timeline import LIMIT, LISTENING, Absence, Drawing, Insta
 BRIEF = 0.8
 """Longest speech of a listener whose words nobody tells."""
 WORDS_WAIT = 1.5
+LONGEST_SOUND = 3.0
+"""Longest sound without words that may be none; where perception tells addressees, the words come late."""
+LONGEST_SOUND_TOLD = 15.0
 THIRD_TURN = 1.5
 FACE_GRACE = 2.0
 ROUND = 1e-6
@@ -79,6 +82,9 @@ class Coder:
                 self._expire(side, _known(act)[0])
             if isinstance(act, Turn):
                 self._robot(self._sides[act.to], act)
+                for side in self._sides.values():
+                    if side.person != act.to:
+                        self._listens_beside(side, act)
             elif isinstance(act, Absence):
                 self._leaves(self._sides[act.who], act)
             elif id(act) in self._turns:
@@ -196,6 +202,27 @@ class Coder:
                 self._note("backchannel", ROBOT, side.person, sign[0].since[0], "completed")
         return found
 
+    def _listens_beside(self, side: Side, turn: Turn) -> None:
+        """Read what somebody says to the robot while it says something to another."""
+        for since, until in turn.speech:
+            beside = [
+                each for each in self._timeline.spans
+                if each.who == side.person and each.to == ROBOT and each.action == "speak"
+                and since < each.since < until
+            ]  # fmt: skip
+            for speech in beside:
+                self._used |= {
+                    id(each) for each in self._timeline.spans
+                    if each.who == side.person and speech.since < each.since < speech.until and each.action != "speak"
+                }  # fmt: skip
+                self._used.add(id(speech))
+                is_brief = speech.seconds <= (self._longest_sound if self._timeline.is_worded else BRIEF) + ROUND
+                takes_floor = not is_brief if speech.known is None else speech.words not in LISTENING
+                if speech.until > until or takes_floor:
+                    self._turns.add(id(speech))
+                else:
+                    self._note("backchannel", ROBOT, side.person, speech.since[0], "completed")
+
     def _is_listening(self, side: Side, turn: Turn) -> bool:
         """True if the robot says a little while the person speaks, and has nothing to answer."""
         speech = [each for each in self._timeline.spans if each.who == side.person and each.action == "speak"]
@@ -222,7 +249,7 @@ class Coder:
         return [
             each for each in self._timeline.spans
             if each.who == sign.who and each.action == "speak" and each.to == ROBOT
-            and each.since < sign.since < each.until
+            and each.since < sign.since < each.until and not self._is_noise(each)
         ]  # fmt: skip
 
     def _together(self, signs: Sequence[Span]) -> Iterator[list[Span]]:
@@ -252,8 +279,17 @@ class Coder:
     def _person(self, side: Side, sign: Span) -> None:
         """Read a sign outside the robot's turns to this person."""
         goes_with_words = sign.action != "speak" and self._words_beside(sign)
-        if sign.since >= side.answers_until and not goes_with_words:
+        if sign.since >= side.answers_until and not goes_with_words and not self._is_noise(sign):
             self._takes_turn(side, sign)
+
+    @property
+    def _longest_sound(self) -> float:
+        return LONGEST_SOUND_TOLD if self._timeline.tells else LONGEST_SOUND
+
+    def _is_noise(self, sign: Span) -> bool:
+        """True for a sound of which no words come where they would have come: a cough, or a laugh."""
+        is_wordless = sign.known is None and self._timeline.is_worded and id(sign) not in self._used
+        return sign.action == "speak" and is_wordless and sign.seconds <= self._longest_sound + ROUND
 
     def _takes_turn(self, side: Side, sign: Span) -> None:
         """Read an answer, or words of the person's own."""

@@ -59,7 +59,7 @@ who looks at the robot while it waits has answered at once
     robot: started 1, failed 6
 
 who has answered, and makes a sound without words, says no more
-    0.1 ann speaks 0.2 to=bob; 1 robot asks ann 2; 3.6 ann speaks 1 to=robot; 5.5 ann speaks 1; 20 end
+    0 ann said 0 to=bob; 1 robot asks ann 2; 3.6 ann speaks 1; 4.6 ann said 3.6; 5.5 ann speaks 1; 20 end
     robot: started 1, succeeded 3.6 after 0.6, completed 4.6
 
 somebody else answers
@@ -144,6 +144,61 @@ of two who begin at once who was asked answers, and the other has a turn of thei
     1 robot asks bob 2; 3.5 ann looks robot; 3.6 ann speaks 1; 3.6 bob speaks 1; 3.7 bob looks robot; 20 end
     robot: started 1, succeeded 3.6 after 0.6, completed 4.6
     ann: started 3.6, failed 8.6
+
+a laugh after a question is no answer
+    0 ann said 0; 1 robot asks ann 2; 2 ann looks robot; 3.5 ann speaks 0.8; 20 end
+    robot: started 1, failed 7
+
+... what comes after it is
+    0 ann said 0; 1 robot asks ann 2; 2 ann looks robot; 3.5 ann speaks 0.8; 5 ann speaks 0.4; 5.6 ann said 5; 20 end
+    robot: started 1, succeeded 5 after 2, completed 5.4
+
+... and so is the sound if its words come late
+    0 ann said 0; 1 robot asks ann 2; 2 ann looks robot; 3.5 ann speaks 0.4; 6 ann said 3.5; 20 end
+    robot: started 1, succeeded 3.5 after 0.5, completed 3.9
+
+... or when nobody waits any longer
+    0 ann said 0; 1 robot asks ann 2; 2 ann looks robot; 3.5 ann speaks 0.4; 9 ann said 3.5; 20 end
+    robot: started 1, failed 7, failed 7
+
+... but not if the robot has asked something else meanwhile
+    0 ann said 0; 1 robot asks ann 2; 2 ann looks robot; 3.5 ann speaks 0.4; 5 robot asks ann 1; 7 ann said 3.5; 9 end
+    robot: started 1, superseded 5
+    robot: started 5, failed 10
+
+a sound that lasts is speech, although its words have not come
+    0 ann said 0; 1 robot asks ann 2; 2 ann looks robot; 3.5 ann speaks 5; 7 known
+    robot: started 1, succeeded 3.5 after 0.5
+
+where nobody tells words a sound is speech
+    1 robot asks ann 2; 2 ann looks robot; 3.5 ann speaks 0.8; 20 end
+    robot: started 1, succeeded 3.5 after 0.5, completed 4.3
+
+who stands by and says "uh-huh" to the robot listens
+    0 ann said 0; 1 robot asks ann 4; 1 bob looks robot; 2 bob speaks 0.4; 2.6 bob said 2 words=uh-huh; 20 end
+    robot: started 1, failed 9
+    robot bc: started 2.4, succeeded 2.4, completed 2.4
+
+... or laughs
+    0 ann said 0; 1 robot asks ann 4; 1 bob looks robot; 2 bob speaks 0.4; 20 end
+    robot: started 1, failed 9
+    robot bc: started 2.4, succeeded 2.4, completed 2.4
+
+... and who says something else has a turn
+    0 ann said 0; 1 robot asks ann 4; 1 bob looks robot; 2 bob speaks 0.4; 2.6 bob said 2 words=wait; 20 end
+    robot: started 1, failed 9
+    bob: started 2, failed 6.4
+
+... or goes on when the robot is silent
+    0 ann said 0; 1 robot asks ann 4; 1 bob looks robot; 4.8 bob speaks 0.4; 5.6 bob said 4.8 words=uh-huh; 20 end
+    robot: started 1, failed 9
+    bob: started 4.8, started 5.6, failed 9.2
+
+somebody's early words answer for both who were asked, also if one of them speaks meanwhile
+    1 robot asks ann,bob 2; 2 ann looks robot; 2 cy looks robot; 4 cy speaks 0.6; 4.5 ann speaks 0.6; 20 end
+    robot: started 1, preempted 4 after 1 by cy
+    robot: started 1, preempted 4 after 1 by cy
+    ann: started 4.5, failed 9.1
 
 a typed line is for the robot
     1 ann looks bob; 2 ann types hello; 20 end

@@ -82,7 +82,8 @@ class Timeline(Struct):
         log = Log(*self.people, adjacency_pair_limit=LIMIT)
         if self.is_worded:
             for person in self.people:
-                log.feed(Worded(actor=person, since=0.0, text="so"), 0.0)
+                to = frozenset((ROBOT,)) if self.tells else None
+                log.feed(Worded(actor=person, since=0.0, text="so", to=to), 0.0)
         steps = sorted(self._steps(log), key=lambda each: each[:2])
         for (at, _), _, step in steps:
             while (due := log.session.deadline) is not None and due < at - 1e-6:
@@ -193,7 +194,7 @@ class Drawing:
         since = since[0], NAMES.index(person)  # who is observed first of two that begin together, does not matter
         one = Span(person, "speak", since, until, to)
         if self.timeline.is_worded and chance.random() < 0.8:
-            one.words = chance.choice((*LISTENING, *OTHER))
+            one.words = chance.choice((*LISTENING, *OTHER) if one.seconds < 2.5 else OTHER)
             is_alone = len(self.timeline.people) == 1
             one.known = self._at(until[0] + (chance.choice((0.0, 0.1)) if is_alone or one.seconds < 1.3 else 0.0))
             one.known = max(one.known, (until[0], until[1] + 1))
@@ -245,7 +246,8 @@ class Drawing:
                 until = max(until, self._at(last[0] + self._between(0.0, 0.5)))
             if len(self.timeline.people) > 1:  # words that come after the turn: it depends on what else is known then
                 for one in spoken:
-                    if one.who == to and one.known is not None and one.until <= until <= one.known:
+                    ends = [until] if one.who == to else [end for _, end in speech]
+                    if one.known is not None and any(one.until <= end <= one.known for end in ends):
                         one.known = one.until[0], one.until[1] + 1
             if not self._is_away(to, at - 2.5, until[0] + 0.1):
                 turn = Turn(f"turn{len(self.timeline.turns)}", kind, to, speech, until)

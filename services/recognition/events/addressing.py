@@ -13,11 +13,13 @@ stand in one order, from what is certain to what is likely:
    look at a face says nothing;
 5. an answer goes to who has just spoken to the speaker, unless the speaker has answered since; and to the robot as
    long as it waits for the speaker's answer;
-6. more words go to those to whom the words before went. A sound of which no words come, where they would have come,
-   is no more words: who has just answered the robot laughs at what a neighbor says.
+6. more words go to those to whom the words before went, unless perception will say with the words to whom they are.
 
 If none of them finds anybody, it is not known, and nothing follows from it. The gaze is known when the speech is
 over, the words later still. Rules 1 to 3 decide as soon as they apply; the others at the end.
+
+Before all of them: a sound that is over, and of which no words have come where they would have come, is for nobody.
+It is a cough, or a laugh at what a neighbor says.
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -26,9 +28,14 @@ from msgspec import Struct, field
 
 from engage_hri.schemas.units import Probability, Seconds
 
-JUST_SPOKEN: Seconds = 6.0
-"""Time after somebody's words in which what the other says is still about them: as long as people take to answer
-(`recognition.adjacency_pair_limit`)."""
+LONGEST_UNKNOWN: Seconds = 3.0
+"""Time after which a sound that still goes on is speech, and it is decided by the looks so far to whom. Ours."""
+WORDS_AFTER: Seconds = 1.0
+"""Time after a sound for which its words are waited for: without any it is no speech; perception may say with them to
+whom they are, if it ever has; and they may call somebody by name. Ours."""
+LONGEST_UNTOLD: Seconds = 15.0
+"""As `LONGEST_UNKNOWN`, where perception tells addressees: it may do so only with the words, when the speech is over.
+A question of the robot waits so long, at most, until it is known that what somebody else says is no answer. Ours."""
 SHORT_CALL = 3
 """Number of words up to which a name at the end calls somebody. Ours."""
 MARKS = ".,!?;:…¡¿\"'“”„‘’«»、。！？"
@@ -46,13 +53,15 @@ class Spoken(Struct, kw_only=True):
     since: Seconds
     to: Addressees | None = None
     until: Seconds | None = None
+    is_noise: bool = False
+    """True if no words have come of it."""
 
     def is_to(self, actor: str) -> bool:
         return self.to is WHOEVER or (self.to is not None and actor in self.to)
 
-    def is_just_before(self, at: Seconds) -> bool:
-        """True if a speech that begins at `at` comes during this one, or soon after it."""
-        return self.since <= at and (self.until is None or at <= self.until + JUST_SPOKEN)
+    def is_just_before(self, at: Seconds, within: Seconds) -> bool:
+        """True if a speech that begins at `at` comes during this one, or at most `within` after it."""
+        return self.since < at and (self.until is None or at <= self.until + within)
 
 
 class FaceTimes(Struct):
@@ -86,6 +95,10 @@ class OwnSpeech(Spoken, kw_only=True):
     words: str = ""
     is_interjected: bool = False
     """True if it began while the robot had the floor."""
+    is_beside: bool = False
+    """True if it began while the robot said something to others."""
+    may_be_noise: bool = False
+    """True as long as words of it would tell that it is no cough."""
 
 
 def named(words: str, names: Mapping[str, str]) -> Addressees:
@@ -116,15 +129,19 @@ def certain(
     return None if company and not is_line else frozenset((robot,))
 
 
-def likely(speech: OwnSpeech, spoken: Iterable[Spoken], *, awaited_by: Addressees, is_noise: bool) -> Addressees:
+def likely(
+    speech: OwnSpeech, spoken: Iterable[Spoken], *, within: Seconds, awaited_by: Addressees, is_untold: bool
+) -> Addressees:
     """Addressees by rules 4 to 6, once the speech is over, or so far.
 
-    spoken: what was said before, by all. awaited_by: who has asked the speaker, and still waits for the answer.
-    is_noise: no words of it have come, where they would have come.
+    spoken: what was said before, by all. within: time after somebody's words in which the other's are about them, as
+    long as people take to answer. awaited_by: who has asked the speaker, and still waits for the answer.
+    is_untold: perception will say with the words to whom it is, and has not yet.
     """
     if face := speech.faces.most(speech.since):
         return frozenset((face,))
-    recent = [each for each in spoken if each.is_just_before(speech.since) and each.since < speech.since]
+    said = [each for each in spoken if not each.is_noise]
+    recent = [each for each in said if each.is_just_before(speech.since, within)]
     last = max(
         (each for each in recent if speech.actor == each.actor or each.is_to(speech.actor)), key=_since, default=None
     )
@@ -132,7 +149,7 @@ def likely(speech: OwnSpeech, spoken: Iterable[Spoken], *, awaited_by: Addressee
         return awaited_by
     if last.actor != speech.actor:
         return frozenset((last.actor,))
-    return NOBODY if is_noise or last.to is None else last.to
+    return NOBODY if is_untold or last.to is None else last.to
 
 
 def _since(spoken: Spoken) -> Seconds:

@@ -9,6 +9,7 @@ from engage_hri.schemas.behaviors import Action, Cause
 from engage_hri.schemas.recognition import InterjectionReading
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.events.addressing import WORDS_AFTER
 from engage_hri.services.recognition.events.adjacency_pair import INTERRUPTED, RESPONDING, AdjacencyPair
 from engage_hri.services.recognition.events.backchannel import BRIEF, UNDECIDED, Backchannel
 from engage_hri.services.recognition.events.history import Latest
@@ -29,11 +30,9 @@ SPEECHES_KEPT = 8
 
 
 class Conversation:
-    """Conversation of one person with the robot. robot_speaks: the robot speaks to the person already."""
+    """Conversation of one person with the robot."""
 
-    def __init__(
-        self, id: str, scene: SessionScene, config: RecognitionConfig, writer: EventWriter, *, robot_speaks: bool
-    ) -> None:
+    def __init__(self, id: str, scene: SessionScene, config: RecognitionConfig, writer: EventWriter) -> None:
         self.id = id
         self.speaks_since: Seconds | None = None
         self.silent_since: Seconds | None = None
@@ -43,8 +42,8 @@ class Conversation:
         own, each with the block of that turn."""
         self.own_backchannel = Backchannel(writer, limit=config.backchannel_limit)
         self.robot_backchannel = Backchannel(writer, limit=config.backchannel_limit)
-        self.robot_speaks_now = robot_speaks
-        """True while the robot speaks to this person."""
+        self.robot_speaks_since = scene.robot_speaks_to(id)
+        """Time when the robot began what it says to this person now; None: it says nothing to them."""
         self._speech_confidence: Probability = 1.0
         self._speeches: Latest[Seconds, Seconds | None] = Latest(SPEECHES_KEPT)
         """Ends of the person's latest speeches, by their starts; None: it goes on."""
@@ -79,12 +78,12 @@ class Conversation:
 
     @property
     def _pair_deadline(self) -> Seconds | None:
-        """Deadline of the pair; None while speech of anybody that began in time may yet turn out to be the answer."""
+        """Deadline of the pair; None while speech of anybody that began in time may yet turn out to be part of it."""
         pair, sign, at = self.pair, self._sign, self.pair.deadline
-        if at is None or not pair.may_be_answered:
+        if at is None or pair.is_interrupted:
             return at
         began_in_time = sign is not None and any(in_time(speech.since, at) for speech in sign.speeches)
-        if began_in_time and pair.may_be_answered_with("speak"):
+        if began_in_time and pair.may_go_on_with("speak"):
             return None
         return None if pair.question is not None and self._scene.may_be_answered(self.id, at) else at
 
@@ -104,7 +103,13 @@ class Conversation:
 
     @property
     def robot_holds_floor(self) -> bool:
-        return self.robot_speaks_now or self.pair.robot_holds_turn
+        return self.robot_speaks_since is not None or self.pair.robot_holds_turn
+
+    def is_into_turn(self, at: Seconds) -> bool:
+        """True if what the person does at `at` is in the robot's turn. It may be known only now, and be earlier."""
+        if self.pair.event is not None and self.pair.robot_holds_turn:
+            return at >= self.pair.event.started
+        return self.robot_speaks_since is not None and at >= self.robot_speaks_since
 
     @property
     def is_spoken_to(self) -> bool:
@@ -119,25 +124,44 @@ class Conversation:
     def is_under_way(self) -> bool:
         """True if one holds the floor, or a pair, a sign or a backchannel is open."""
         is_open = self.pair.event is not None or self.robot_backchannel.event is not None or self._cut_into
-        return self.robot_speaks_now or self.holds_floor or self._sign is not None or bool(is_open)
+        return self.robot_speaks_since is not None or self.holds_floor or self._sign is not None or bool(is_open)
 
-    def speaks(self, at: Seconds, confidence: Probability = 1.0) -> None:
+    def speaks(self, at: Seconds, confidence: Probability = 1.0, *, beside: bool = False) -> None:
+        """Take the beginning of speech. beside: the robot says something to others."""
         if self.speaks_since is not None:
             return
         self.speaks_since, self.silent_since = at, None
         self._speeches[at] = None
         self._speech_confidence = confidence
-        # A line that was typed has no length by which it could be judged: who sends one has something to say.
-        if self.robot_holds_floor and self._scene.lines.get(self.id) != at:
-            self._signs("speak", at, confidence)
-        else:
-            if self.robot_holds_floor:
-                self._writer.interject(self.id, at, "interruption", at)
-            elif (said := self._scene.robot_spoken) is not None and said.since <= at:
-                # Said to the robot while it speaks to others: it has no other reading.
-                self._writer.interject(self.id, at, "open", at)
-                self._writer.interject(self.id, at, "interruption", at)
-            self._human_turn(at, "speak", confidence)
+        if self.is_into_turn(at) or beside:
+            self._writer.interject(self.id, at, "open", at)
+            # A line that was typed has no length by which it could be judged: who sends one has something to say.
+            if self._scene.lines.get(self.id) != at:
+                self._signs("speak", at, confidence, beside=not self.robot_holds_floor)
+                return
+            self._writer.interject(self.id, at, "interruption", at)
+        elif self._is_before_question(at):
+            return
+        self._human_turn(at, "speak", confidence)
+        self._robot_has_answered(at)
+
+    def _is_before_question(self, at: Seconds) -> bool:
+        """True if what the person has said at `at` is known only now, and the robot has begun another pair since."""
+        return self.pair.event is not None and self.pair.may_be_answered and at < self.pair.event.started
+
+    def _robot_has_answered(self, at: Seconds) -> None:
+        """Take what the robot says now for the answer to what the person has begun to say before, at `at`."""
+        if self.robot_speaks_since is not None and at < self.robot_speaks_since:
+            self.pair.robot_begins("speak", self.robot_speaks_since)
+
+    def has_said(self, since: Seconds, until: Seconds, confidence: Probability) -> None:
+        """Take speech that is over, known only now. It answers nothing that the robot has asked since."""
+        if self._is_before_question(since):
+            return
+        if self.speaks_since is None:
+            self.silent_since = until
+        self._human_turn(since, "speak", confidence)
+        self._robot_has_answered(since)
 
     def falls_silent(self, at: Seconds) -> None:
         if self.speaks_since is None:
@@ -151,7 +175,7 @@ class Conversation:
         """Take a nod, a shake or a point of the person."""
         if self.holds_floor and (self._sign is None or not self._sign.going_on("speak")):
             return  # it goes with the person's own words, and says nothing more
-        if self.robot_holds_floor:
+        if self.robot_holds_floor or (self._sign is not None and self._sign.until is None):
             self._signs(action, at, confidence)
         elif not self.pair.human_begins(action, at, confidence):
             self.pair.answers_late(action, at, confidence)
@@ -162,15 +186,15 @@ class Conversation:
 
     # -- signs in the robot's turn ------------------------------------------------------------------------------
 
-    def _signs(self, action: Action, at: Seconds, confidence: Probability) -> None:
+    def _signs(self, action: Action, at: Seconds, confidence: Probability, *, beside: bool = False) -> None:
         if self._sign is not None and self._sign.until is not None:
             self._was_backchannel(self._sign, self._sign.until)  # its words have not come until the next one begins
-        self._joins(SignPart(action, at, confidence))
+        self._joins(SignPart(action, at, confidence), beside=beside)
 
-    def _joins(self, part: SignPart) -> None:
+    def _joins(self, part: SignPart, *, beside: bool = False) -> None:
         """Make a part of the sign that goes on, or of a new one."""
         if self._sign is None:
-            self._sign = ListenerSign([])
+            self._sign = ListenerSign([], is_beside=beside)
         self._sign.parts.append(part)
         self._sign.is_wordless = False  # this one's words may come
 
@@ -179,12 +203,26 @@ class Conversation:
         sign = self._sign
         if sign is None or (sign.speeches and self._listens(sign.speeches[-1].since)):
             return None
-        return sign.deadline(WORDS_WAIT if self._is_worded else self._config.backchannel_limit)
+        if not self._is_worded:
+            return sign.deadline(self._config.backchannel_limit)
+        return (
+            sign.deadline(self._scene.longest_unknown, WORDS_AFTER) if sign.is_beside else sign.deadline(WORDS_WAIT)
+        )
+
+    @property
+    def beside_since(self) -> Seconds | None:
+        """Start of what the person says while the robot speaks to others, as long as it may be a turn."""
+        return self._sign.since if self._sign is not None and self._sign.is_beside else None
 
     @property
     def _is_worded(self) -> bool:
         """True if words of what the person says now may come, and would decide what it is."""
-        return self.robot_holds_floor and self._scene.is_worded
+        return self._is_in_robots_words and self._scene.is_worded
+
+    @property
+    def _is_in_robots_words(self) -> bool:
+        """True while the robot speaks to the person, or to others while the person makes a sign."""
+        return self.robot_holds_floor or (self._sign is not None and self._sign.is_beside)
 
     def _sign_is_due(self, at: Seconds) -> None:
         """Decide the sign: its speech has become too long for a backchannel, or its words have not come."""
@@ -268,14 +306,14 @@ class Conversation:
                     self._was_backchannel(ListenerSign([part]), part.until)
         elif listens is False and self._brief is not None and self._brief[0] == since:
             self._writer.interject(self.id, since, "interruption", at)
-            is_answer = pair.human_begins("speak", since, self._speech_confidence)
-            if is_answer and self._brief[1] is not None:
+            self._human_turn(since, "speak", self._speech_confidence)
+            if self._brief[1] is not None:
                 pair.ends("speak", self._brief[1], by_robot=False)
 
     def _listens(self, since: Seconds) -> bool | None:
         """True if the words of a speech are a listener's; None: they are unknown, or not said to the robot's turn."""
         words, event = self._writer.text_of(self.id, since), self.pair.event
-        if not says_words(words) or not self.robot_holds_floor or (event is not None and since < event.started):
+        if not says_words(words) or not self._is_in_robots_words or (event is not None and since < event.started):
             return None
         return is_listening(words)
 
@@ -324,7 +362,7 @@ class Conversation:
 
     def robot_speaks(self, at: Seconds, *, listens: bool) -> None:
         """Take the beginning of the robot's speech. listens: it is a backchannel that was announced."""
-        self.robot_speaks_now = True
+        self.robot_speaks_since = at
         self.pair.robot_heard(None)
         if self.holds_floor and not self.pair.robot_holds_turn:
             if self.robot_backchannel.state != BRIEF and not self.pair.is_cut_into:
@@ -334,7 +372,9 @@ class Conversation:
             self.pair.forget_unanswered()
 
     def robot_falls_silent(self, at: Seconds) -> None:
-        self.robot_speaks_now = False
+        self.robot_speaks_since = None
+        if self._sign is not None:
+            self._sign.is_beside = False
         self.pair.robot_heard(at)
         listening, since = self.robot_backchannel, self.robot_backchannel.undecided_since
         if listening.state == BRIEF or (since is not None and in_time(at, since + self._config.backchannel_limit)):
@@ -353,7 +393,7 @@ class Conversation:
     def robot_goes_on(self, action: Action, since: Seconds) -> None:
         """Take speech or a gesture of the robot that goes on, known only now. It may be the answer."""
         if action == "speak":
-            self.robot_speaks_now = True
+            self.robot_speaks_since = since
             self.pair.robot_heard(None)
         if self.pair.event is not None and since >= self.pair.event.started:
             self.pair.robot_begins(action, since)
@@ -365,14 +405,14 @@ class Conversation:
 
     def turn_ends(self, at: Seconds) -> None:
         # Before the pair is decided: of several answers during the turn the one that began first counts.
-        if not self.robot_speaks_now:
+        if self.robot_speaks_since is None:
             self._keep_floor(at)
         self.pair.turn_ends(at)
         self._floor_is_free(at)
 
     def _floor_is_free(self, at: Seconds) -> None:
         """Turn undecided speech that outlasts the other's turn into a turn of its own."""
-        if not self.robot_holds_floor:
+        if not self._is_in_robots_words:
             self._keep_floor(at)
             self._brief = None
         if self.robot_backchannel.state == UNDECIDED and not self.holds_floor:
@@ -439,7 +479,7 @@ class Conversation:
             self._cut_into.append((self.pair, event.block))
             self.pair = self._new_pair(self._writer, self._config)
         self.pair.robot_asks(event)
-        if self.robot_speaks_now:
+        if self.robot_speaks_since is not None:
             self.pair.robot_heard(None)
 
     def _pairs(self) -> Iterator[AdjacencyPair]:

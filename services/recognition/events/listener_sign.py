@@ -11,6 +11,9 @@ word is over. All of these begin alike. So such a sign has several readings, of 
 | its speech is longer than a backchannel, or than words take to come, and they have not | that it is a backchannel |
 | it is over, and nothing of this has been seen | that it interrupts |
 
+So it is, too, for who stands by, and says something to the robot while that speaks to others. But there somebody may
+say more before it is decided, for it is known only at the end, or after some seconds, whether it is for the robot.
+
 What one does at the same time is one sign: who nods and says "uh-huh" gives one backchannel. Without this the nod
 would be the answer if it begins a moment after the "uh-huh", and a backchannel if it begins a moment before. A sign
 is decided once: when one reading is left, at the latest at its `deadline`. Thesis 2.2.3 and 2.2.4.
@@ -37,11 +40,12 @@ class SignPart(Struct):
 class ListenerSign(Struct):
     """All that a listener does at one time, in the order in which it began.
 
-    is_wordless: the words of its speech have not come in time.
+    is_wordless: the words of its speech have not come in time. is_beside: the robot speaks to others.
     """
 
     parts: list[SignPart]
     is_wordless: bool = False
+    is_beside: bool = False
 
     @property
     def since(self) -> Seconds:
@@ -65,12 +69,16 @@ class ListenerSign(Struct):
         """Parts that go on. action: only those."""
         return [part for part in self.parts if part.until is None and action in (None, part.action)]
 
-    def deadline(self, limit: Seconds) -> Seconds | None:
+    def deadline(self, limit: Seconds, words_after: Seconds = 0.0) -> Seconds | None:
         """Time at which its speech decides it, if its words do not; None: it has no speech, or that has decided.
 
-        limit: longest speech that is a backchannel.
+        limit: longest speech that is a backchannel. words_after: time after the speech for which words may come.
         """
         if not self.speeches or self.is_wordless:
             return None
         speech = self.speeches[-1]
-        return speech.since + (limit if speech.until is None else WORDS_WAIT)
+        return (
+            speech.since + limit
+            if speech.until is None
+            else max(speech.since + WORDS_WAIT, speech.until + words_after)
+        )

@@ -222,6 +222,10 @@ class People:
             scene.questions[id] = question
         elif id in scene.questions:
             del scene.questions[id]
+        if (since := person.talk.undecided_since) is not None:
+            scene.unknown[id] = since
+        elif id in scene.unknown:
+            del scene.unknown[id]
         (scene.asked.add if person.talk.is_asked else scene.asked.discard)(id)
         self.agenda.set(id, person.deadline)
         self._touched.add(id)
@@ -242,9 +246,9 @@ class People:
 def _answered_by_other(taken_up: TakenUp, asked: PersonRecognition) -> None:
     """Tell the person who was asked that somebody else has answered."""
     _, by, action, at = taken_up
-    asked.talk.other_answers(by, action, at)
+    asked.talk.take_early(at, lambda talk: talk.pair.other_answers(by, action, at))
 
 
 def _answered_for_all(answered: OngoingEvent, at: Seconds, asked: PersonRecognition) -> None:
     """Tell a person that the robot's question to several people, maybe to this one, has been answered."""
-    asked.talk.take(at, lambda talk: talk.pair.answered_for_all(answered, at))
+    asked.talk.take_early(at, lambda talk: talk.pair.answered_for_all(answered, at))

@@ -11,7 +11,7 @@ from engage_hri.schemas.fragments import Claim
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import GazeResolution
-from engage_hri.services.recognition.events.addressing import Addressees, Spoken
+from engage_hri.services.recognition.events.addressing import LONGEST_UNKNOWN, LONGEST_UNTOLD, Addressees, Spoken
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, in_time
 
@@ -42,6 +42,7 @@ class Worded(Struct, frozen=True, kw_only=True):
     """Observation: all that is known of the words of a person's speech. since: local time at which that began.
 
     is_alone: nothing but the words tells of this speech, and it is told next. is_line: it was typed in no time.
+    is_announced: words of it have been told that are not final.
     """
 
     actor: str
@@ -49,6 +50,7 @@ class Worded(Struct, frozen=True, kw_only=True):
     text: str
     is_alone: bool = False
     is_line: bool = False
+    is_announced: bool = False
     to: Addressees | None = None
     """Addressees, if perception knows them."""
 
@@ -212,6 +214,11 @@ class SessionScene:
         if other in self.people_in_world:
             self.people_in_world = self.people_in_world - {other} | {kept}
 
+    @property
+    def longest_unknown(self) -> Seconds:
+        """Time after which it is decided what a sound that goes on is, and for whom."""
+        return LONGEST_UNTOLD if self.tells_addressees else LONGEST_UNKNOWN
+
     def is_face(self, target: str) -> bool:
         """True if a look at `target` is one at the face of a person or of the robot."""
         return target == self.robot or target in self.present
@@ -219,16 +226,17 @@ class SessionScene:
     def note_spoken(self, spoken: Spoken) -> None:
         """Remember a speech whose addressees are known now."""
         self.floor_changes += 1
-        self.spoken.append(spoken)
+        if not any(each is spoken for each in self.spoken):
+            self.spoken.append(spoken)
 
     @property
     def robot_speaks_since(self) -> Seconds | None:
         """Time when the robot began what it says now; None: it is silent."""
         return None if self.robot_spoken is None else self.robot_spoken.since
 
-    def robot_speaks_to(self, person: str) -> bool:
-        """True while the robot speaks to this person, or to nobody known."""
-        return self.robot_spoken is not None and self.robot_spoken.is_to(person)
+    def robot_speaks_to(self, person: str) -> Seconds | None:
+        """Time when the robot began what it says now to this person, or to nobody known; None: it says nothing."""
+        return self.robot_spoken.since if self.robot_spoken is not None and self.robot_spoken.is_to(person) else None
 
     def answers_for_another(self, person: str, action: Action, at: Seconds, *, after: Seconds) -> bool:
         """Take what a person says to the robot as the answer to a question that the robot has asked somebody else.
@@ -255,7 +263,7 @@ class SessionScene:
         if not self.asked or not self.unknown:
             return False
         place = self.place(person, at)
-        return any(self.place(who, since) < place for who, since in self.unknown.items())
+        return any(who != person and self.place(who, since) < place for who, since in self.unknown.items())
 
     def place(self, person: str, at: Seconds) -> tuple[Seconds, bool, str]:
         """Place of what a person begins to say in the order in which people are heard: who is asked comes first."""

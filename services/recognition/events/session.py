@@ -22,7 +22,7 @@ from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.addressing import NOBODY, WHOEVER, Addressees, Spoken
+from engage_hri.services.recognition.events.addressing import NOBODY, WHOEVER, WORDS_AFTER, Addressees, Spoken
 from engage_hri.services.recognition.events.conversation import TURN_PATIENCE
 from engage_hri.services.recognition.events.history import ActionHistory, Latest
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock, anchor
@@ -30,7 +30,7 @@ from engage_hri.services.recognition.events.machine import Effect, EventWriter, 
 from engage_hri.services.recognition.events.people import People
 from engage_hri.services.recognition.events.person import PersonRecognition
 from engage_hri.services.recognition.events.scene import Covered, SessionScene, Worded
-from engage_hri.services.recognition.events.talk import LONGEST_UNKNOWN, LONGEST_UNTOLD, Step
+from engage_hri.services.recognition.events.talk import Step
 from engage_hri.services.reports.ongoing_actions import GoesOn
 
 WORDS_PATIENCE: Seconds = 10.0
@@ -341,7 +341,7 @@ class Session:
         if words.to is not None:
             self.scene.tells_addressees = True
             self.scene.told_addressees[words.actor, words.since] = words.to
-        self.scene.is_worded |= not words.is_line
+        self.scene.is_worded |= words.is_announced or (bool(words.text) and not words.is_line)
         if words.text:
             self._writer.understand(words.actor, words.since, words.text, at)
         if words.actor in self.persons:
@@ -430,7 +430,8 @@ class Session:
         """Longest time from the robot's last deed to the decision, also if the turn's end or anchors never come."""
         offsets = [found[1] for text in wanted.anchors if (found := anchor(text)) is not None]
         limit = max(event.limit or 0.0, self._config.backchannel_limit)
-        unknown = LONGEST_UNTOLD if self.scene.tells_addressees else LONGEST_UNKNOWN if self.in_company else 0.0
+        is_open = self.in_company or self.scene.is_worded
+        unknown = self.scene.longest_unknown + WORDS_AFTER if is_open else 0.0
         return limit + TURN_PATIENCE + max([0.0, *offsets]) + unknown + SETTLING
 
     def _clock(self, event: OngoingEvent, wanted: Event) -> LimitClock | None:

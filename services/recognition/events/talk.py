@@ -1,9 +1,11 @@
 """Talk of one person and the robot, told to their `Conversation` once it is known to whom each speech is.
 
-With nobody else there all is known at once. In company it is known only at the end of a speech, or with its words,
-whether it is for the robot (`addressing`). What the robot says or asks meanwhile may be the answer to it. So from
-such a speech on everything waits in line, and is told in the order in which it happened, with its own times: what is
-known late has happened early.
+In company it is known only at the end of a speech, or with its words, whether it is for the robot (`addressing`). And
+where recognizers tell words, these tell whether a sound is speech at all: a cough after a question is no answer. What
+the robot says or asks meanwhile may be the answer to it. So from such a speech on everything waits in line, and is
+told in the order in which it happened, with its own times: what is known late has happened early.
+
+A sound into the robot's own words is decided by the conversation, which knows what else it may be (`listener_sign`).
 """
 
 from collections import deque
@@ -15,6 +17,7 @@ from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.addressing import (
     NOBODY,
+    WORDS_AFTER,
     Addressees,
     FaceTimes,
     OwnSpeech,
@@ -22,20 +25,15 @@ from engage_hri.services.recognition.events.addressing import (
     likely,
 )
 from engage_hri.services.recognition.events.conversation import Conversation
+from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.kinds import KindRecognizer, TimedStep
 from engage_hri.services.recognition.events.limits import ROUNDING, LimitClock
 from engage_hri.services.recognition.events.machine import EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import Question, SessionScene
 from engage_hri.services.text.listening import says_words
 
-LONGEST_UNKNOWN: Seconds = 3.0
-"""Time after which it is decided to whom a speech is that still goes on, by the looks so far. Ours."""
-ADDRESSEES_WAIT: Seconds = 1.0
-"""Time after a speech for which its words are waited for: perception may say with them to whom they are, if it ever
-has; and the words of who has looked at nobody's face may call somebody by name. Ours."""
-LONGEST_UNTOLD: Seconds = 15.0
-"""As `LONGEST_UNKNOWN`, where perception tells addressees: it may do so only with the words, when the speech is over.
-A question of the robot waits so long, at most, until it is known that what somebody else says is no answer. Ours."""
+NOISES_KEPT = 8
+"""Number of sounds of which words may still tell that they were speech."""
 Step = Callable[[Conversation], object]
 
 
@@ -44,13 +42,15 @@ class Talk(KindRecognizer):
 
     def __init__(self, id: str, scene: SessionScene, config: RecognitionConfig, writer: EventWriter) -> None:
         super().__init__(id, scene, config, writer)
-        self._conversation = Conversation(id, scene, config, writer, robot_speaks=scene.robot_speaks_to(id))
+        self._conversation = Conversation(id, scene, config, writer)
         self._line: deque[tuple[Seconds, Step | OwnSpeech]] = deque()
         """What is not told yet, with its times. The first is a speech of which it is not known to whom it is."""
         self._is_asked_in_line = False
         """True if a first turn of the robot is in line."""
         self._speech: OwnSpeech | None = None
         """The speech of the person that goes on."""
+        self._noises: Latest[Seconds, OwnSpeech] = Latest(NOISES_KEPT)
+        """The latest sounds of which no words have come, by their starts."""
 
     @property
     def speaks_since(self) -> Seconds | None:
@@ -79,6 +79,12 @@ class Talk(KindRecognizer):
         return question._replace(known_until=self._line[0][0]) if question is not None and self._line else question
 
     @property
+    def undecided_since(self) -> Seconds | None:
+        """Start of the first of what the person says of which it is not known whether it is for the robot."""
+        beside = self._conversation.beside_since
+        return beside if beside is not None or not self._line else self._line[0][0]
+
+    @property
     def is_asked(self) -> bool:
         """True if the robot asks the person, or waits for an answer, as far as is known."""
         return self._is_asked_in_line or self._conversation.pair.may_be_answered
@@ -103,21 +109,21 @@ class Talk(KindRecognizer):
 
     @property
     def _decided_at(self) -> Seconds | None:
-        """Time at which it is decided to whom the first speech in line is; None: that is known, and it waits."""
+        """Time at which the first speech in line is decided; None: it is, and waits."""
         _, speech = self._line[0]
-        if not isinstance(speech, OwnSpeech) or speech.to is not None:
+        if not isinstance(speech, OwnSpeech) or self._is_known(speech):
             return None
-        longest = speech.since + (LONGEST_UNTOLD if self._scene.tells_addressees else LONGEST_UNKNOWN)
         if speech.until is None:
-            return longest
+            return speech.since + self._scene.longest_unknown
         may_call = self._scene.is_worded and not speech.faces.most(speech.since)
-        return min(longest, speech.until + (ADDRESSEES_WAIT if may_call or self._scene.tells_addressees else 0.0))
+        is_open = self._may_be_noise(speech) or may_call or self._scene.tells_addressees
+        return speech.until + (WORDS_AFTER if is_open else 0.0)
 
     # -- the person ---------------------------------------------------------------------------------------------
 
     def looks_at(self, face: str, at: Seconds) -> None:
         """Take a look at a face, or away from all ("")."""
-        for speech in self._unknown:
+        for speech in self._undecided:
             if speech.until is None:
                 speech.faces.turns(face, at)
 
@@ -142,7 +148,12 @@ class Talk(KindRecognizer):
         self._speech = speech = self._own_speech(at, confidence, face)
         speech.told, speech.words = self._scene.told_to(self.id, at), self._writer.text_of(self.id, at)
         # What waits in line may be the robot's own turn, so that only the scene knows that it has begun.
-        is_into_turn = self._conversation.robot_holds_floor or (self._line and self._scene.robot_speaks_to(self.id))
+        said_now = self._scene.robot_speaks_to(self.id) if self._line else None
+        is_into_turn = self._conversation.is_into_turn(at) or (said_now is not None and said_now <= at)
+        said = self._scene.robot_spoken
+        speech.is_beside = said is not None and said.since <= at and not said.is_to(self.id)
+        is_line = self._scene.lines.get(self.id) == at
+        speech.may_be_noise = self._scene.is_worded and not (is_line or speech.is_beside or says_words(speech.words))
         is_known = self._find(speech, face, at)
         if is_into_turn and (not is_known or speech.is_to(self._scene.robot)):
             self._writer.interject(self.id, at, "open", at)
@@ -180,26 +191,40 @@ class Talk(KindRecognizer):
 
     def understand(self, since: Seconds, words: str, told: Addressees | None, at: Seconds) -> None:
         """Take the words of a speech. told: addressees, if perception knows them."""
-        for speech in self._unknown:
+        for speech in self._undecided:
             if speech.since == since:
                 speech.words, speech.told = words or speech.words, told or speech.told
-                self._find(speech, "", at)
+                speech.may_be_noise &= not says_words(speech.words)
+                if speech.to is None:
+                    self._find(speech, "", at)
+        if since in self._noises and says_words(words):
+            self._was_speech(self._noises.pop(since), words, at)
         self.take(at, lambda talk: talk.understand(since, at))
         self.go_on(at)
+
+    def _was_speech(self, speech: OwnSpeech, words: str, at: Seconds) -> None:
+        """Take a sound for speech after all: its words have come late."""
+        speech.words, speech.is_noise, speech.to = words, False, None
+        if not self._find(speech, "", at):
+            self._likely(speech, at)
+        waits = any(each is speech for _, each in self._line)
+        if speech.is_to(self._scene.robot) and speech.until is not None and not waits:
+            since, until, confidence = speech.since, speech.until, speech.confidence
+            self.take(at, lambda talk: talk.has_said(since, until, confidence))
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         """Take the person's leaving: nothing waits any longer."""
         if self._speech is not None and self._speech.until is None:
             self._speech.until = until
         self._speech = None
-        for speech in self._unknown:
-            self._likely(speech, at)
+        for speech in self._undecided:
+            self._decide(speech, at)
         self.go_on(at)
         self._take_in_order(at, lambda talk: talk.person_gone(at, until))
 
     def person_back(self) -> None:
         """Take the person's return: the robot may be speaking, or may have fallen silent meanwhile."""
-        self._conversation.robot_speaks_now = self._scene.robot_speaks_to(self.id)
+        self._conversation.robot_speaks_since = self._scene.robot_speaks_to(self.id)
 
     def _own_speech(self, since: Seconds, confidence: Probability, face: str) -> OwnSpeech:
         return OwnSpeech(actor=self.id, since=since, confidence=confidence, faces=FaceTimes(since, face))
@@ -211,6 +236,15 @@ class Talk(KindRecognizer):
         if self._line:
             self._line.append((at, step))
         else:
+            step(self._conversation)
+
+    def take_early(self, at: Seconds, step: Step) -> None:
+        """Take what happened at `at` and is known only now: it comes before all in line that happened later."""
+        place = sum(when <= at for when, _ in self._line)
+        if place:
+            self._line.insert(place, (at, step))
+        else:
+            self._catch_up(at)
             step(self._conversation)
 
     def limit(self, wanted: Event) -> Seconds | None:
@@ -259,30 +293,25 @@ class Talk(KindRecognizer):
         """Take what ends a question of the robot, after what somebody else may have answered before."""
         if self.is_asked and self._waits_for_others(at):
             self._line.append((at, step))
-            self._note_unknown()
         else:
             self.take(at, step)
-
-    def other_answers(self, person: str, action: Action, at: Seconds) -> None:
-        """Take the answer of somebody else. It comes before all that is in line."""
-        self._catch_up(at)
-        self._conversation.pair.other_answers(person, action, at)
 
     def _waits_for_others(self, at: Seconds) -> bool:
         """True if somebody else may have answered the robot before `at`."""
         return self._scene.is_contested(self.id, at)
 
     @property
-    def _unknown(self) -> list[OwnSpeech]:
-        return [each for _, each in self._line if isinstance(each, OwnSpeech) and each.to is None]
+    def _undecided(self) -> list[OwnSpeech]:
+        speeches = [each for _, each in self._line if isinstance(each, OwnSpeech)]
+        return [each for each in speeches if each.to is None or each.may_be_noise]
 
-    def _note_unknown(self) -> None:
-        """Let the others know whether a speech waits whose addressees may turn out to be theirs."""
-        if self._line:
-            self._scene.unknown[self.id] = self._line[0][0]
-        else:
-            self._is_asked_in_line = False
-            self._scene.unknown.pop(self.id, None)
+    def _may_be_noise(self, speech: OwnSpeech) -> bool:
+        """True if the first speech in line may be a cough. The conversation judges those into its turn."""
+        return speech.may_be_noise and not self._conversation.is_into_turn(speech.since)
+
+    def _is_known(self, speech: OwnSpeech) -> bool:
+        """True if it is known to whom the first speech in line is, and that it is one."""
+        return speech.to is not None and not self._may_be_noise(speech)
 
     def _find(self, speech: OwnSpeech, face: str, at: Seconds) -> bool:
         """Decide to whom the speech is if that is certain. face: whose face the person looks at."""
@@ -303,43 +332,56 @@ class Talk(KindRecognizer):
 
     def _queue(self, at: Seconds, speech: OwnSpeech) -> None:
         is_next = speech.is_to(self._scene.robot) and self._waits_for_others(at)
-        if self._line or speech.to is None or is_next:
+        if self._line or not self._is_known(speech) or is_next:
             self._line.append((at, speech))
-            self._note_unknown()
         elif speech.is_to(self._scene.robot):
-            self._conversation.speaks(at, speech.confidence)
+            self._conversation.speaks(at, speech.confidence, beside=speech.is_beside)
+
+    def _decide(self, speech: OwnSpeech, at: Seconds) -> None:
+        """Decide what the sound is, by what is known: nothing, if it is over and has no words; else to whom it is."""
+        if self._may_be_noise(speech) and speech.until is not None:
+            speech.may_be_noise, speech.is_noise, speech.to = False, True, NOBODY
+            self._noises[speech.since] = speech
+            return
+        speech.may_be_noise = False
+        if speech.to is None:
+            self._likely(speech, at)
 
     def _likely(self, speech: OwnSpeech, at: Seconds) -> None:
         """Decide to whom a speech is by what is likely."""
         if speech.until is None:
             speech.faces.turns(speech.faces.face, at)
-        is_noise = self._scene.tells_addressees and not says_words(speech.words)
         waits = self._conversation.pair.may_be_answered_with("speak")
         awaited_by = frozenset((self._scene.robot,)) if waits else NOBODY
-        to = likely(speech, self._scene.spoken, awaited_by=awaited_by, is_noise=is_noise)
+        is_untold = self._scene.tells_addressees and not says_words(speech.words)
+        within = self._config.adjacency_pair_limit
+        to = likely(speech, self._scene.spoken, within=within, awaited_by=awaited_by, is_untold=is_untold)
         self._address(speech, to, at)
 
     def may_go_on(self, now: Seconds) -> bool:
         """True if it is decided by `now` to whom the first speech in line is, or if what is decided may be told."""
         if not self._line:
             return False
-        decided_at = self._decided_at
-        return not self._waits_for_others(self._line[0][0]) if decided_at is None else decided_at <= now
+        decided_at, since = self._decided_at, self.undecided_since
+        assert since is not None
+        return not self._waits_for_others(since) if decided_at is None else decided_at <= now
 
     def go_on(self, now: Seconds) -> None:
         """Tell all in line up to the next speech of which it is not known to whom it is."""
         while self.may_go_on(now):
             at, item = self._line[0]
-            if isinstance(item, OwnSpeech) and item.to is None:
-                self._likely(item, now)
+            if isinstance(item, OwnSpeech) and not self._is_known(item):
+                self._decide(item, now)
                 continue
             self._line.popleft()
             self._catch_up(at)
             if not isinstance(item, OwnSpeech):
                 item(self._conversation)
             elif item.is_to(self._scene.robot):
-                self._conversation.speaks(at, item.confidence)
-        self._note_unknown()
+                self._conversation.speaks(at, item.confidence, beside=item.is_beside)
+        if self._line:
+            self._catch_up(self._line[0][0])
+        self._is_asked_in_line &= bool(self._line)
 
     def _catch_up(self, until: Seconds) -> None:
         """Take the steps of the conversation that were due before `until`."""

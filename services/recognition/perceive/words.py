@@ -142,7 +142,7 @@ class Words:
         """
         last = person.speeches[-1] if person.speeches else None
         if last is not None and words.began < last.until:
-            return Worded(actor=words.actor, since=last.since, text="", to=words.to)
+            return Worded(actor=words.actor, since=last.since, text="", is_announced=bool(words.text), to=words.to)
         return None if words.to is None else Worded(actor=words.actor, since=words.began, text="", to=words.to)
 
     def speech(self, words: TimedWords) -> list[ActionBegan | ActionEnded]:
