@@ -243,6 +243,18 @@ class WindowStatistics(Struct, frozen=True, kw_only=True, omit_defaults=True):
 EngagementLevel = Literal["engaged", "engaging", "disengaging", "disengaged", "unknown"]
 
 
+class Contact(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Contact of a person with the robot: looks at it, talk with it, shared looks.
+
+    now: how much there is of it; None: nobody tells of looks. share: of the last seconds, up to the instant of the
+    statistics. ended: when the last contact did; None: none has, as far as is known.
+    """
+
+    now: Probability | None = None
+    share: Probability = 0.0
+    ended: Stamp | None = None
+
+
 class Statistics(Struct, frozen=True, kw_only=True, tag="statistics", omit_defaults=True):
     """state: recognition. Statistics of the connection events with one person, or with all, and their engagement.
 
@@ -250,6 +262,7 @@ class Statistics(Struct, frozen=True, kw_only=True, tag="statistics", omit_defau
     session: since the beginning. recent: of the last seconds, `window` of the configuration.
     engagement: estimate in 0..1; None: too little is known. level: the same in a word. reasons: why, in words.
     busy: the person is busy with a task, so that silence is no sign of less engagement.
+    busy_until: when the last task was over. level_since: when the level became what it is; of both None: not known.
     """
 
     actor: str
@@ -260,3 +273,6 @@ class Statistics(Struct, frozen=True, kw_only=True, tag="statistics", omit_defau
     level: EngagementLevel = "unknown"
     reasons: tuple[str, ...] = ()
     busy: bool = False
+    busy_until: Stamp | None = None
+    level_since: Stamp | None = None
+    contact: Contact = Contact()

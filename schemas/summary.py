@@ -161,7 +161,8 @@ def summary(*outcomes: FragmentOutcome) -> Summary:
 
 
 def _last(events: Iterable[ConnectionEvent]) -> ConnectionEvent | None:
-    return max(events, key=lambda event: event.started.seconds, default=None)
+    """The last event. One that was lost may have gone on as another, since the same instant."""
+    return max(events, key=lambda event: (event.started.seconds, event.state != "lost"), default=None)
 
 
 def _answer(pair: ConnectionEvent | None, *, is_over: bool) -> Action | Literal["none", "pending"] | None:

@@ -90,21 +90,22 @@ class Deadlines(Generic[K]):
     """One deadline at most for each name. Setting, clearing and asking for the earliest take logarithmic time.
 
     order: sort key of names that have equal deadlines; without it the one that was set first comes first.
-    look: when to call `due`, not after the earliest deadline; infinite if there is none. It may be too early, since
-    `clear` does not change it.
+    look: when to call `due`, the earliest deadline; infinite if there is none.
     """
 
     def __init__(self, order: Callable[[K], Any] | None = None) -> None:
         self.look = inf
         self._at: dict[K, Seconds] = {}
         self._heap: list[tuple[Seconds, Any, int, K]] = []
-        """Entries, outdated ones too: these go when they reach the top, or when they outnumber the others by far."""
+        """Entries, outdated ones too: these go when they reach the top, or when they outnumber the others by far.
+        So the top is never outdated."""
         self._order = order
         self._count = count()
 
     def clear(self, name: K) -> None:
         """Remove the deadline of `name`, if it has one."""
-        self._at.pop(name, None)
+        if self._at.pop(name, None) is not None:
+            self._settle()
 
     def set(self, name: K, at: Seconds | None) -> None:
         """Give `name` this deadline instead of any other; None removes it."""
@@ -112,11 +113,20 @@ class Deadlines(Generic[K]):
             self.clear(name)
         elif self._at.get(name) != at:
             self._at[name] = at
-            self.look = min(self.look, at)
+            changes_look = at <= self.look or self._heap[0][-1] == name
             heapq.heappush(self._heap, (at, self._order and self._order(name), next(self._count), name))
             if len(self._heap) > OUTDATED + 4 * len(self._at):
                 self._heap = [entry for entry in self._heap if self._at.get(entry[-1]) == entry[0]]
                 heapq.heapify(self._heap)
+            if changes_look:
+                self._settle()
+
+    def _settle(self) -> None:
+        """Drop outdated entries from the top."""
+        heap, at = self._heap, self._at
+        while heap and at.get(heap[0][-1]) != heap[0][0]:
+            heapq.heappop(heap)
+        self.look = heap[0][0] if heap else inf
 
     def __getitem__(self, name: K) -> Seconds | None:
         return self._at.get(name)
@@ -127,24 +137,21 @@ class Deadlines(Generic[K]):
     @property
     def earliest(self) -> Seconds | None:
         """The earliest deadline; None if there is none."""
-        heap = self._heap
-        while heap and self._at.get(heap[0][-1]) != heap[0][0]:
-            heapq.heappop(heap)
-        return heap[0][0] if heap else None
+        return self._heap[0][0] if self._heap else None
 
     @property
     def first(self) -> K | None:
         """The name that has the earliest deadline; None if there is none."""
-        return None if self.earliest is None else self._heap[0][-1]
+        return self._heap[0][-1] if self._heap else None
 
     def due(self, now: Seconds) -> K | None:
         """Remove the earliest deadline that has come and return its name; None if none has come."""
         earliest = self.earliest
         if earliest is None or earliest > now:
-            self.look = inf if earliest is None else earliest
             return None
         name = heapq.heappop(self._heap)[-1]
         del self._at[name]
+        self._settle()
         return name
 
 

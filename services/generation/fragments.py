@@ -183,6 +183,7 @@ class Fragments:
         """Speak to people by other ids from now on. name: the new one of each."""
         self._turns.rename(name)
         self._outcomes.rename(name)
+        self._heard.rename(name)
         for performance in self._live.values():
             performance.rename(name)
 
@@ -190,9 +191,9 @@ class Fragments:
         """Start the grace after which the open events are lost: recognition may only be cut off."""
         self._waits.set(_RECOGNITION_AWAY, now + GRACE)
 
-    def recognition_there(self, session: str) -> None:
+    def recognition_there(self, session: str, now: Seconds) -> None:
         self._waits.clear(_RECOGNITION_AWAY)
-        self._events.lose(session)
+        self._events.lose(now, session)
 
     def body_lost(self) -> None:
         """Forget the body: another one may come."""
@@ -242,7 +243,7 @@ class Fragments:
             self._waits.keep(("undecided", id), performance.deadline, now)
         due = {*iter(lambda: self._waits.due(now), None)}
         if _RECOGNITION_AWAY in due:
-            self._events.lose()
+            self._events.lose(now)
         while (aborted := self._turns.tick(now)) is not None:
             self._abort(aborted, now)
         self._hold_or_go_on()

@@ -189,7 +189,7 @@ class GenerationIntake:
                 self._fragments.recognition_gone(now)
                 self._arbiter.recognition_lost()
             case PeerAlive(participant="recognition", run=run):
-                self._fragments.recognition_there(session_of(run))
+                self._fragments.recognition_there(session_of(run), now)
 
     def _tell(self, told: Iterable[TimedReport]) -> None:
         """Take what somebody does, or did while nobody told of it."""

@@ -75,10 +75,11 @@ from engage_hri.services.runtime.intake import (
 Content = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | OngoingActions | World | RobotState | HeadOwner
     | SyncPointProgress | BlockProgress | HeadPose | VoiceActivity | Utterance | RequestEvent | SignalTurn | Cancel
-    | PeerAlive | PeerGone | Statistics | OpenEvents | SamePeople
+    | PeerAlive | PeerGone | ConnectionEvent | Statistics | SamePeople | OpenEvents
 )  # fmt: skip
-"""Messages that recognition takes into account; the last three are those of its former life, and come by no bus."""
+"""Messages that recognition takes into account; the last four are those of its former life, and come by no bus."""
 _CONTENT = get_args(Content)
+Former = ConnectionEvent | Statistics | SamePeople | OpenEvents
 _News = ActionBegan | ActionEnded | ActorFound | ActorLost | HeadPose | VoiceActivity | Utterance
 """Messages that tell of what has just happened."""
 
@@ -147,7 +148,7 @@ class Intake:
         message = input.message
         if isinstance(message, Cancel):
             self._feed(message, now)
-        elif isinstance(message, Statistics | OpenEvents | SamePeople):
+        elif isinstance(message, Former):
             if not input.key:
                 self._resume(message, now)
         elif self._is_credible(input):
@@ -164,20 +165,25 @@ class Intake:
                 self._feed(message, self._when(message, input.at))
         return self._take()
 
-    def _resume(self, state: Statistics | OpenEvents | SamePeople, now: Seconds) -> None:
+    def _resume(self, state: Former, now: Seconds) -> None:
         """Go on from a state of a former life that was told on this clock, not long ago."""
         if state.at.clock != self._clock.name or state.at.seconds > now:
             return
         if isinstance(state, SamePeople):  # the last change of it may be long ago: that life went on
             if max(self._former_until, state.at.seconds) > now - FORGOTTEN_AFTER:
                 self._identities.resume(state.people)
+                for same in state.people:
+                    self._recognizer.session.scene.call(self._identities.inside(same.actor), same.actor, same.name)
+            self._note(())  # all has been counted by now
             return
         if state.at.seconds <= now - FORGOTTEN_AFTER:
+            return
+        if isinstance(state, ConnectionEvent):
+            self._statistics.remember(state)
             return
         self._former_until = max(self._former_until, state.at.seconds)
         if isinstance(state, Statistics):
             self._statistics.resume(state, now)
-            self._note(())
             return
         pairs = [each for each in state.events if each.kind == "adjacency_pair" and each.state == "started"]
         for former in pairs[-1:]:  # one before it has been answered, by the robot's own first turn
@@ -219,11 +225,13 @@ class Intake:
             self._note(self._recognizer.join(other, kept, now))
             for each in going:
                 self._feed(each, now)
+        session.scene.call(kept, other, join.before, join.name)
 
     def _part(self, parting: Parting) -> None:
         """Take a person for another than was guessed. What is open with them is told as theirs from now on."""
         at, actor = Stamp(self._clock.name, self._now), parting.id
         self._tell(self._reports.part(parting.leaving, parting.old, parting.new, self._now))
+        self._recognizer.session.scene.call(parting.new, *parting.leaving, parting.new)
         if actor == parting.new:
             return  # recognition knows whose id it was by that person's own
         for id, before in tuple(self._told.items()):

@@ -120,10 +120,10 @@ class Recognizer:
         until = now if settled > now else math.nextafter(settled, -math.inf)
         return self._told([*results, *self.session.advance(until)])
 
-    def contacts(self) -> dict[str, Probability]:
+    def contacts(self) -> dict[str, Probability | None]:
         """Contact of each person with the robot, of those for whom it may have changed since the last call.
 
-        By what the session knows, or by how much the head attends to the robot, whichever is more.
+        By what the session knows, or by how much the head attends to the robot, whichever is more; None: by neither.
         """
         changed = self.session.contacts()
         for id, much in self._attention.attended.items():
@@ -134,7 +134,7 @@ class Recognizer:
         known = {
             id: [each for each in (much, self._heads.get(id)) if each is not None] for id, much in changed.items()
         }
-        return {id: max(much) for id, much in known.items() if much}
+        return {id: max(much, default=None) for id, much in known.items()}
 
     def join(self, other: str, kept: str, at: Seconds) -> list[Result]:
         """Take two persons for one, who is `kept` from now on: see `Session.join`."""

@@ -67,7 +67,7 @@ class _Recognition:
         self.desk = RequestDesk(bus, "recognition", self._cancel)
         self._bus = bus
         clock = BusClock(bus)
-        self._former = FormerLife(config.memory)
+        self._former = FormerLife(config.memory, config.window)
         self._intake = Intake(bus.robot, config, clock, session_of(bus.run))
         self.steps = NotedIntake(bus, "recognition", self._intake, clock, self._carry_out)
 

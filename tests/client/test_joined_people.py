@@ -10,9 +10,9 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import GazeShift
 from engage_hri.schemas.fragments import HeadOwner
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, Utterance
 from engage_hri.schemas.summary import Summary
-from engage_hri.schemas.units import Vector
+from engage_hri.schemas.units import Stamp, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.language_models import perform_call
@@ -49,6 +49,14 @@ class Eyes:
     def tell(self, kind: type[Any], actor: str, **fields: object) -> None:
         message: Message = kind(actor=actor, at=self._bus.stamp(), **fields)
         self._bus.publish(keys.PERCEIVED_ACTION, message)
+
+    def stamp(self) -> Stamp:
+        return self._bus.stamp()
+
+    def say_of(self, actor: str, text: str, began: Stamp) -> None:
+        """Tell what somebody has said since then."""
+        now = self._bus.stamp()
+        self._bus.publish(keys.UTTERANCE, Utterance(actor=actor, id="1", text=text, began=began, ended=now, at=now))
 
     async def say(self, text: str, **fields: object) -> Summary:
         call = {"turn_status": "full", "parts": [{"say": text}], **fields}
@@ -142,6 +150,23 @@ def test_who_is_named_while_the_robot_speaks_may_interrupt_it() -> None:
 
         assert (told.status, told.answered_by) == ("interrupted", "ann")
         assert [(each.who, each.reading) for each in told.interjections] == [("ann", "interruption")]
+
+    play(story)
+
+
+def test_what_a_person_has_said_by_another_id_is_heard_of_that_person() -> None:
+    async def story(eyes: Eyes) -> None:
+        await found_again(eyes)
+        eyes.tell(ActionBegan, "face_3", action="speak")
+        began = eyes.stamp()
+        await asyncio.sleep(1.0)
+        eyes.tell(ActionEnded, "face_3", action="speak")
+        eyes.say_of("face_3", "It is me.", began)
+        await asyncio.sleep(0.5)
+        await joined(eyes)
+        told = await answering(eyes, eyes.say("Do you like tea?"))
+
+        assert [(each.who, each.text) for each in told.heard] == [("ann", "It is me.")]
 
     play(story)
 

@@ -28,6 +28,6 @@ def test_what_a_life_of_recognition_that_is_over_has_not_decided_is_lost_and_not
     events.feed(event("old-2", "started", 3.0), 3.0)
     events.feed(event("old-2", "failed", 3.0), 4.0)
 
-    events.lose(session)
+    events.lose(5.0, session)
 
     assert [each.state for each in events.of_turn("turn")] == states

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Iterable
+from math import inf
 from typing import Any
 
 import pytest
@@ -199,7 +200,7 @@ class Stage:
         person = session.persons.get(actor.id)
         if person is None or not person.presence.here:
             return Belief(False)
-        looks = "" if person.gaze.ended is not None else _first(person.gaze.targets)
+        looks = "" if person.gaze.ended < inf else _first(person.gaze.targets)
         return Belief(True, looks, person.talk.speaks_since is not None, actor.id in session.busy)
 
 

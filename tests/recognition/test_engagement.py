@@ -45,7 +45,8 @@ class Told:
             self._feed([], self._published.deadline)
 
     def _feed(self, events: list[ConnectionEvent], now: Seconds, contact: Probability | None = None) -> None:
-        self._published.feed(events, self._busy, now, {"human": contact})
+        contacts = {} if contact is None else {"human": contact}
+        self._published.feed(events, self._busy, now, contacts)
         self.messages += [statistics for statistics in self._published.told(now) if statistics.actor == self._actor]
 
     @property

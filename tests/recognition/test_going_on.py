@@ -1,5 +1,7 @@
 """What goes on, and becomes known only now, answers what waits for it and begins nothing. Read `event_stories.py`."""
 
+from math import inf
+
 import pytest
 
 from tests.recognition.event_stories import check
@@ -85,7 +87,7 @@ def test_the_floor_belongs_to_who_goes_on_speaking():
 
     assert log.session.persons[HUMAN].talk.speaks_since == 1.0
     assert log.session.scene.robot_speaks_since == 2.0
-    assert log.session.scene.others_silent_since(HUMAN) is None
+    assert log.session.scene.others_silent_since(HUMAN) == inf
 
 
 @pytest.mark.parametrize(("action", "longest"), [("speak", 60.0), ("act", 120.0)])

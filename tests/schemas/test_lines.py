@@ -119,7 +119,8 @@ def test_statistics_of_all() -> None:
 
     assert json.loads(line(message) or "") == {
         "type": "statistics", "actor": "", "at": 3.0, "engagement": 0.5, "level": "engaged", "reasons": [],
-        "busy": False,
+        "busy": False, "busy_until": None, "level_since": None,
+        "contact": {"now": None, "share": 0.0, "ended": None},
         "session": {
             "events": 2, "mtbce": 5.7, "mtbce_without_maintenance": None, "max_gap": None, "last_start": 2.5,
             "last_start_without_maintenance": None,

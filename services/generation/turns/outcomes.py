@@ -15,6 +15,7 @@ from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.turns.interjections import Interjections
 from engage_hri.services.generation.turns.policy import Aborted, TurnPlan
+from engage_hri.services.reports.same_people import renamed
 
 LOOKS_BACK: Seconds = 60.0
 """Time before a turn of which the words still count, if there was no turn meanwhile."""
@@ -85,6 +86,15 @@ class HeardWords:
         """Note that the words of an answer have not come: nobody waits for those of this person until more come."""
         self._told_of.pop(person, None)
 
+    def rename(self, name: Callable[[str], str]) -> None:
+        """Know people by other ids from now on. name: the new one of each."""
+        said, self._said = self._said, {}
+        for (actor, id, number), each in said.items():
+            while (name(actor), id, number) in self._said:
+                number += 1  # of the other one, who has used the same id
+            self._said[name(actor), id, number] = _Said(renamed(each.utterance, name), each.known)
+        self._told_of = {name(actor): None for actor in self._told_of}
+
     # -- turns --------------------------------------------------------------------------------------------------
 
     def turn_begins(self, turn: str, now: Seconds) -> None:
@@ -120,6 +130,8 @@ WORDS_PATIENCE: Seconds = 2.0
 words of that person: recognizers know them 0.3 to 2 s after they were said. Decision 0065."""
 LONGEST_ANSWER: Seconds = 15.0
 """Time after the beginning of such an answer for which the outcome waits for its end. Ours."""
+RESUMED_WITHIN: Seconds = 1.0
+"""Time after the return of recognition within which it tells again of the pairs that it goes on with. Ours."""
 
 
 class TurnEvents:
@@ -131,6 +143,7 @@ class TurnEvents:
         """The turn of each block."""
         self._changed: dict[str, Seconds] = {}
         """When each event came to its state."""
+        self._resumed_until: dict[str, Seconds] = {}
         self.session = ""
         """Session of recognition's present life; empty: none is there, as far as is known."""
 
@@ -151,12 +164,21 @@ class TurnEvents:
         """Local time at which the event came to its state, as far as is known here."""
         return self._changed.get(event.id, float("-inf"))
 
-    def lose(self, session: str = "") -> None:
-        """End undecided events of other sessions as lost: recognition is gone, or has come back as `session`."""
+    def lose(self, now: Seconds, session: str = "") -> None:
+        """End undecided events of other sessions as lost: recognition is gone, or has come back as `session`.
+
+        If it has come back, it may go on with a pair: it then tells of it again under another id.
+        """
         self.session = session
         for id, event in self._events.items():
             if event.state == "started" and event.session != session:
                 self._events[id] = replace(event, state="lost")
+                if session:
+                    self._resumed_until[id] = now + RESUMED_WITHIN
+
+    def resumed_until(self, pair: ConnectionEvent) -> Seconds:
+        """Time until which a pair that was lost may be gone on with; long ago: it may not."""
+        return self._resumed_until.get(pair.id, float("-inf"))
 
     def of_turn(self, turn: str) -> tuple[ConnectionEvent, ...]:
         """The events of a turn, by their start."""
@@ -182,6 +204,7 @@ class TurnEvents:
         self._turn_of = {block: turn for block, turn in self._turn_of.items() if turn in kept}
         self._events = {id: event for id, event in self._events.items() if event.block in self._turn_of}
         self._changed = {id: at for id, at in self._changed.items() if id in self._events}
+        self._resumed_until = {id: at for id, at in self._resumed_until.items() if id in self._events}
 
 
 class _Record(Struct):
@@ -264,13 +287,15 @@ class TurnOutcomes:
     def _due_at(self, turn: str) -> Seconds:
         """Time when the outcome of a turn is due: its end or, with an open pair, some time after the pair's limit.
 
-        After an answer in words it is once these are known, if somebody tells them, but no later than a while.
+        After an answer in words it is once these are known, if somebody tells them, but no later than a while. A pair
+        that recognition has lost may be told of again once it is back.
         """
         pair = self._events.open_pair(turn)
         ended = self._records[turn].ended
         if pair is not None:
             return ended + (pair.limit or 0.0) + self._config.decision_patience
-        return max((ended, *map(self._words_due_at, self._events.pairs(turn))))
+        pairs = self._events.pairs(turn)
+        return max((ended, *map(self._words_due_at, pairs), *map(self._events.resumed_until, pairs)))
 
     def _words_due_at(self, pair: ConnectionEvent) -> Seconds:
         """Time until which the words of an answer are waited for; long ago: they are not."""

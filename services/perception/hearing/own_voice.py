@@ -38,7 +38,7 @@ VAIN: Seconds = 10.0
 
 
 class OwnVoice:
-    """What the robot's voice is heard of, in the time of the loop.
+    """Sound of the robot's voice as it is to be heard, in the time of the loop.
 
     told: loop time of the latest beginning of its sound that was told.
     """
@@ -77,7 +77,7 @@ class OwnVoice:
 
 
 class Canceller:
-    """What takes the robot's voice out of one microphone.
+    """Filter that takes the robot's voice out of one microphone.
 
     sounds: whether the voice was to be heard in the last piece, or its echo. is_sure: it was, and is not over yet.
     """

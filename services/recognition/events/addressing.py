@@ -108,11 +108,22 @@ def named(words: str, names: Mapping[str, str]) -> Addressees:
     middle, and at the end of a sentence, it may be what the sentence is about.
     """
     said = [word for word in words.split() if any(map(str.isalnum, word))]
-    calls = said[:1]
-    if len(said) > 1 and (len(said) <= SHORT_CALL or said[-2].endswith(",")):
-        calls = [said[0], said[-1]]
-    plain = [word.strip(MARKS).casefold() for word in calls]
-    return frozenset(names[each] for each in plain if each in names)
+    lengths = range(1 + max((name.count(" ") for name in names), default=0), 0, -1)
+    calls = [said[:length] for length in lengths if _plain(said[:length]) in names][:1]
+    after = len(calls[0]) if calls else 1
+    calls += [
+        said[-length:]
+        for length in lengths
+        if after + length <= len(said)
+        and (len(said) - length < SHORT_CALL or said[-length - 1].endswith(","))
+        and _plain(said[-length:]) in names
+    ][:1]
+    return frozenset(names[_plain(call)] for call in calls)
+
+
+def _plain(words: list[str]) -> str:
+    """Words as in a name."""
+    return " ".join(words).strip(MARKS).casefold()
 
 
 def certain(

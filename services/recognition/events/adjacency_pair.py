@@ -4,6 +4,8 @@ Thesis 2.2.3. The delay runs from the end of the first turn and is negative for 
 that comes while the turn still goes on is known at once, but decided only when the turn has ended.
 """
 
+from math import inf
+
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.events.limits import in_time
@@ -93,14 +95,14 @@ class AdjacencyPair(Machine):
         return self.state == INTERRUPTED
 
     @property
-    def deadline(self) -> Seconds | None:
+    def deadline(self) -> Seconds:
         if self.event is None or self.state not in (ROBOT_WAITING, HUMAN_WAITING, INTERRUPTED):
-            return None
+            return inf
         if self._turn_end is not None:
             return self._turn_end + (self.event.limit or self._limit)
         if self._by_robot and self._last_heard is not None:
             return self._last_heard + self._patience
-        return None
+        return inf
 
     def expire(self, at: Seconds) -> None:
         """Decide the pair at its deadline: no answer within the limit, or a turn of the robot without an end."""
@@ -213,8 +215,7 @@ class AdjacencyPair(Machine):
         """The robot's question that waits for an answer, its turn being over; None: none does."""
         if self.state != ROBOT_WAITING or self._turn_end is None or self.event is None:
             return None
-        until = self.deadline
-        return None if until is None else Question(self.event.accept, self._turn_end, until)
+        return Question(self.event.accept, self._turn_end, self.deadline)
 
     def other_answers(self, person: str, action: Action, at: Seconds) -> None:
         """Take the answer of somebody who was not asked: it is no failure of who was."""

@@ -4,6 +4,8 @@ It starts with the responder, has no delay and cannot fail. Speech shows only at
 whether it was one; longer speech is a change of floor, and so is speech that outlasts the other's turn.
 """
 
+from math import inf
+
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.events.machine import (
     IDLE,
@@ -47,8 +49,9 @@ class Backchannel(Machine):
         return self.event.started if self.event is not None and self.state == UNDECIDED else None
 
     @property
-    def deadline(self) -> Seconds | None:
-        return None if self.undecided_since is None else self.undecided_since + self._limit
+    def deadline(self) -> Seconds:
+        since = self.undecided_since
+        return inf if since is None else since + self._limit
 
     def speaks(self, event: OngoingEvent) -> None:
         self._begin(event, "speaks")

@@ -3,7 +3,8 @@
 They are input of the adjacency pair and of the two backchannels, the person's own and the robot's.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from math import inf
 
 from engage_hri.schemas.behaviors import Action, Cause
 from engage_hri.schemas.recognition import InterjectionReading
@@ -63,29 +64,32 @@ class Conversation:
         )  # fmt: skip
 
     @property
-    def deadlines(self) -> tuple[Seconds | None, ...]:
-        """Times of the `timed_steps`."""
-        if self.pair.event is None and self._sign is None and self.robot_backchannel.event is None:
-            return ()
-        return self._sign_deadline, self.robot_backchannel.deadline, self._pair_deadline
+    def deadline(self) -> Seconds:
+        """Time of the next step that is due by itself; infinite: there is none."""
+        due = inf if self.pair.event is None else self._pair_deadline
+        if self._sign is not None or self.robot_backchannel.event is not None:
+            due = min(due, self._sign_deadline, self.robot_backchannel.deadline)
+        return due
+
+    def pass_time(self, at: Seconds) -> None:
+        """Take the first step that is due at `at`, the `deadline`."""
+        if self._sign_deadline == at:
+            self._sign_is_due(at)
+        elif self.robot_backchannel.deadline == at:
+            self._robot_takes_floor(at)
+        else:
+            self.pair.expire(at)
 
     @property
-    def timed_steps(self) -> Iterator[tuple[Seconds | None, Callable[[Seconds], None]]]:
-        """Steps that are due by themselves, with their times."""
-        yield self._sign_deadline, self._sign_is_due
-        yield self.robot_backchannel.deadline, self._robot_takes_floor
-        yield self._pair_deadline, self.pair.expire
-
-    @property
-    def _pair_deadline(self) -> Seconds | None:
-        """Deadline of the pair; None while speech of anybody that began in time may yet turn out to be part of it."""
+    def _pair_deadline(self) -> Seconds:
+        """Deadline of the pair; infinite while speech of anybody that began in time may yet be part of it."""
         pair, sign, at = self.pair, self._sign, self.pair.deadline
-        if at is None or pair.is_interrupted:
+        if at == inf or pair.is_interrupted:
             return at
         began_in_time = sign is not None and any(in_time(speech.since, at) for speech in sign.speeches)
         if began_in_time and pair.may_go_on_with("speak"):
-            return None
-        return None if pair.question is not None and self._scene.may_be_answered(self.id, at) else at
+            return inf
+        return inf if self._scene.may_be_answered(self.id, at) and pair.question is not None else at
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         for pair in self._pairs():
@@ -199,15 +203,15 @@ class Conversation:
         self._sign.is_wordless = False  # this one's words may come
 
     @property
-    def _sign_deadline(self) -> Seconds | None:
+    def _sign_deadline(self) -> Seconds:
         sign = self._sign
         if sign is None or (sign.speeches and self._listens(sign.speeches[-1].since)):
-            return None
+            return inf
         if not self._is_worded:
             return sign.deadline(self._config.backchannel_limit)
-        return (
-            sign.deadline(self._scene.longest_unknown, WORDS_AFTER) if sign.is_beside else sign.deadline(WORDS_WAIT)
-        )
+        if sign.is_beside:
+            return sign.deadline(self._scene.longest_unknown, WORDS_AFTER)
+        return sign.deadline(WORDS_WAIT)
 
     @property
     def beside_since(self) -> Seconds | None:

@@ -1,7 +1,8 @@
 """Gaze of one person and the robot: directed gaze, at each set of objects by itself, and mutual facial gaze."""
 
 from collections.abc import Iterator
-from functools import partial
+from math import inf
+from operator import attrgetter
 from typing import NamedTuple
 
 from engage_hri.schemas.behaviors import Action, Event, EventKind
@@ -9,7 +10,7 @@ from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.directed_gaze import HUMAN_DIRECTING, DirectedGaze
-from engage_hri.services.recognition.events.kinds import KindRecognizer, TimedStep
+from engage_hri.services.recognition.events.kinds import KindRecognizer
 from engage_hri.services.recognition.events.limits import LimitClock, in_time
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.mutual_facial_gaze import HUMAN_WAITING, MutualFacialGaze
@@ -31,6 +32,9 @@ class _Directed(NamedTuple):
     at: Seconds
 
 
+_is_shared = attrgetter("is_shared")
+
+
 class Gazes(KindRecognizer):
     """The look of a person, and the gaze events with the robot that come of it."""
 
@@ -42,16 +46,19 @@ class Gazes(KindRecognizer):
         self._robot_directed: list[_Directed] = []
 
     @property
-    def deadlines(self) -> list[Seconds | None]:
-        times = [one.deadline for one in self.directed]
-        if self.facial.event is not None:
-            times.append(self.facial.deadline)
-        return times
+    def deadline(self) -> Seconds:
+        due = inf if self.facial.event is None else self.facial.deadline
+        for one in self.directed:
+            due = min(due, one.deadline)
+        return due
 
-    @property
-    def timed_steps(self) -> Iterator[TimedStep]:
-        yield from ((one.deadline, partial(self._expire_directed, one)) for one in self.directed)
-        yield self.facial.deadline, self.facial.expire
+    def pass_time(self, at: Seconds) -> None:
+        one = next((one for one in self.directed if one.deadline == at), None)
+        if one is None:
+            self.facial.expire(at)
+        else:
+            one.expire(at)
+            self._forget_idle(at)
 
     @property
     def is_under_way(self) -> bool:
@@ -60,20 +67,19 @@ class Gazes(KindRecognizer):
 
     @property
     def is_in_contact(self) -> bool:
-        if self._scene.robot in self.gaze.targets or self.facial.is_shared:
+        if self._scene.robot in self.gaze.targets or (self.facial.event is not None and self.facial.is_shared):
             return True
-        return bool(self.directed) and any(one.is_shared for one in self.directed)
+        return bool(self.directed) and any(map(_is_shared, self.directed))
 
     @property
-    def look_directs_at(self) -> Seconds | None:
-        """Time at which the person's look has lasted long enough to direct the robot's; None if it does not."""
+    def look_directs_at(self) -> Seconds:
+        """Time at which the person's look has lasted long enough to direct the robot's; infinite if it does not."""
         gaze = self.gaze
-        if not gaze.targets or gaze.spent or gaze.ended is not None or self.id in self._scene.acting:
-            return None
+        if not gaze.targets or gaze.spent or gaze.ended < inf or self.id in self._scene.acting:
+            return inf
         if not any(map(self._scene.is_object, gaze.targets)):
-            return None
-        silent_since = self._scene.others_silent_since(self.id)
-        return None if silent_since is None else max(self.gaze.since, silent_since) + DIRECT_BY_LOOK
+            return inf
+        return max(gaze.since, self._scene.others_silent_since(self.id)) + DIRECT_BY_LOOK
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         for one in self.directed:
@@ -113,11 +119,9 @@ class Gazes(KindRecognizer):
             robot_on = self._scene.robot_looks_at(one.objects)
             one.gazes(robot_on=robot_on, human_on=human_on, at=at, confidence=confidence)
         self._forget_idle(at)
-        if any(
-            self._scene.person_looks_at(self.gaze, past.objects) and self._is_recent(past, at)
-            for past in self._robot_directed
-        ):
-            self.gaze.spent = True
+        for past in self._robot_directed:
+            if self._scene.person_looks_at(self.gaze, past.objects) and self._is_recent(past, at):
+                self.gaze.spent = True
         self.hands_changed()
 
     def hands_changed(self) -> None:
@@ -208,9 +212,6 @@ class Gazes(KindRecognizer):
                     one.robot_points(at)
             self._forget_idle(at)
 
-    def waits_for(self, block: str, name: str) -> bool:
-        return any(name in clock.waiting for machine in self._machines() for clock in machine.clocks_of(block))
-
     def point_realised(self, block: str, name: str, at: Seconds) -> None:
         for machine in self._machines():
             machine.realised(block, name, at)
@@ -237,10 +238,6 @@ class Gazes(KindRecognizer):
         yield from self.directed
 
     # -- directed gazes that are over ---------------------------------------------------------------------------
-
-    def _expire_directed(self, one: DirectedGaze, at: Seconds) -> None:
-        one.expire(at)
-        self._forget_idle(at)
 
     def _forget_idle(self, at: Seconds) -> None:
         """Drop finished directed gazes, and remember those of the robot for a while."""

@@ -19,8 +19,9 @@ class Latest(dict[Key, Value]):
         self._size = size
 
     def __setitem__(self, key: Key, value: Value) -> None:
-        self.pop(key, None)
-        super().__setitem__(key, value)
+        if key in self:
+            del self[key]
+        dict.__setitem__(self, key, value)
         if len(self) > self._size:
             del self[next(iter(self))]
 
@@ -34,7 +35,7 @@ class ActionHistory:
     def is_new(self, action: ActionBegan | ActionEnded, at: Seconds) -> bool:
         """True unless the report repeats an earlier one, or comes after a newer report of the same action."""
         key = (action.action, action.behavior, action.targets)
-        began, ended = self._performed.get(key, (NEVER, NEVER))
+        began, ended = self._performed.pop(key, (NEVER, NEVER))
         begins = isinstance(action, ActionBegan)
         is_new = at > began and at >= ended if begins else at > ended and at >= began
         self._performed[key] = (began, ended) if not is_new else (at, ended) if begins else (began, at)

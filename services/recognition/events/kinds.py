@@ -4,8 +4,8 @@ Kinds that depend on each other have one recognizer: `Gazes` for both of gaze, `
 other kind has its own, the `RECOGNIZER` of a module called like the kind, and is found by that name.
 """
 
-from collections.abc import Callable, Iterable, Iterator
 from importlib import import_module
+from math import inf
 
 from engage_hri.schemas.behaviors import Action, Event, EventKind
 from engage_hri.schemas.perception import ActionBegan
@@ -14,9 +14,6 @@ from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.limits import LimitClock
 from engage_hri.services.recognition.events.machine import EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import SessionScene
-
-TimedStep = tuple[Seconds | None, Callable[[Seconds], None]]
-"""Step that is due by itself, with its time. None: it is not due."""
 
 
 class KindRecognizer:
@@ -32,14 +29,12 @@ class KindRecognizer:
         self._writer = writer
 
     @property
-    def deadlines(self) -> Iterable[Seconds | None]:
-        """Times of the `timed_steps`."""
-        return ()
+    def deadline(self) -> Seconds:
+        """Time of the next step that is due by itself; infinite: there is none."""
+        return inf
 
-    @property
-    def timed_steps(self) -> Iterator[TimedStep]:
-        """Steps that are due by themselves, in the order in which they happen if the times are equal."""
-        yield from ()
+    def pass_time(self, at: Seconds) -> None:
+        """Take the first step that is due at `at`, the `deadline`."""
 
     @property
     def is_under_way(self) -> bool:
@@ -79,10 +74,6 @@ class KindRecognizer:
 
         clock: of its limit. ended: when the turn of a pair, or else the block, was over, if it was before this.
         """
-
-    def waits_for(self, block: str, name: str) -> bool:
-        """True if a time limit runs from this sync point of a block of the robot."""
-        return False
 
     def point_realised(self, block: str, name: str, at: Seconds) -> None:
         """Take a realised sync point of a block of the robot: time limits may run from there."""

@@ -94,6 +94,10 @@ class LimitClock:
         """Names of the anchors that have not come."""
         return tuple(self._waiting)
 
+    def waits_for(self, name: str) -> bool:
+        """True if this anchor has not come."""
+        return name in self._waiting
+
     @property
     def deadline(self) -> Seconds:
         """Time at which the limit passes; while anchors are `waiting`, at which the patience ends, too."""

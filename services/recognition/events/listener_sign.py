@@ -19,6 +19,8 @@ would be the answer if it begins a moment after the "uh-huh", and a backchannel 
 is decided once: when one reading is left, at the latest at its `deadline`. Thesis 2.2.3 and 2.2.4.
 """
 
+from math import inf
+
 from msgspec import Struct
 
 from engage_hri.schemas.behaviors import Action
@@ -69,13 +71,13 @@ class ListenerSign(Struct):
         """Parts that go on. action: only those."""
         return [part for part in self.parts if part.until is None and action in (None, part.action)]
 
-    def deadline(self, limit: Seconds, words_after: Seconds = 0.0) -> Seconds | None:
-        """Time at which its speech decides it, if its words do not; None: it has no speech, or that has decided.
+    def deadline(self, limit: Seconds, words_after: Seconds = 0.0) -> Seconds:
+        """Time at which its speech decides it, if its words do not; infinite: it has no speech, or that has decided.
 
         limit: longest speech that is a backchannel. words_after: time after the speech for which words may come.
         """
         if not self.speeches or self.is_wordless:
-            return None
+            return inf
         speech = self.speeches[-1]
         return (
             speech.since + limit

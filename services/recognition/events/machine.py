@@ -172,12 +172,12 @@ class EventWriter:
         knows_delay = not begins and (state == "failed" or not event.is_former)
         told = ConnectionEvent(
                 id=event.id, kind=event.kind, initiator=event.initiator, responder=event.responder, state=state,
-                at=self.stamp(at), started=self.stamp(event.started), objects=event.objects, cause=event.cause,
-                optional=event.optional, delay=event.delay if knows_delay else None,
+                at=Stamp(self._clock, at), started=Stamp(self._clock, event.started), objects=event.objects,
+                cause=event.cause, optional=event.optional, delay=event.delay if knows_delay else None,
                 duration=event.duration if ends else None, limit=event.limit if begins else None,
                 response=None if begins else event.response, answered_by=event.answered_by,
                 confidence=event.confidence, block=event.block, behavior=event.behavior, turn=event.turn,
-                words=self._words_of(event),
+                words=self._words_of(event) if event.spoken else "",
                 retold=retold or (begins and event.is_former),
         )  # fmt: skip
         self.effects.append(told)
@@ -241,7 +241,7 @@ class EventWriter:
             del self._spoken[id]
 
     def _words_of(self, event: OngoingEvent) -> str:
-        return " ".join(filter(None, (self._texts.get(speech) for speech in event.spoken)))
+        return " ".join(filter(None, map(self._texts.get, event.spoken)))
 
     def has_open(self, person: str) -> bool:
         """True if an event with `person` is open."""

@@ -6,6 +6,7 @@ while, in case they come back.
 
 from collections.abc import Callable
 from functools import partial
+from math import inf
 
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
@@ -31,10 +32,10 @@ class People:
         self._unknown: dict[str, Seconds] = {}
         self._asked: set[str] = set()
         """`scene.unknown` and `scene.asked` when the deadlines of those who were asked were last updated."""
-        self._touched: set[str] = set()
-        """Persons whose contact with the robot may have changed since somebody has asked for contacts."""
         self._contacts: dict[str, Probability | None] = {}
-        """Contact of each person as it was last told."""
+        """Contact of each person with the robot."""
+        self._new_contacts: dict[str, Probability | None] = {}
+        """Those that have changed since somebody has asked for them."""
         self._silences = 0
         """`scene.silences` when the deadlines of all were last updated."""
         self._scene = scene
@@ -46,12 +47,14 @@ class People:
 
     def person(self, id: str) -> PersonRecognition:
         """The person with this id, made if it is new."""
-        if id not in self.persons:
+        person = self.persons.get(id)
+        if person is None:
             self._met += 1
             person = PersonRecognition(id, self._met, self._scene, self._config, self._writer)
             self.persons[id] = self._here[id] = person
             self._scene.present.add(id)
-        return self.persons[id]
+            self._scene.call(id, id)
+        return person
 
     def see(self, world: World, at: Seconds) -> None:
         """Take a view of the world: people in it are here, those that are missing now may have gone."""
@@ -67,8 +70,7 @@ class People:
     def _note(self, person: PersonRecognition, at: Seconds) -> None:
         """Note a sign of the person, or its leaving, at `at`."""
         self._unseen.pop(person.id, None)
-        reported = person.presence.here and person.presence.reported
-        if not reported and person.id not in self._scene.people_in_world:
+        if not person.presence.reported and person.id not in self._scene.people_in_world:
             self._unseen[person.id] = at
 
     def forget(self, now: Seconds) -> None:
@@ -89,8 +91,8 @@ class People:
         self._here.pop(id, None)
         self._unseen.pop(id, None)
         self._scene.forget_person(id)
-        self._touched.discard(id)
         self._contacts.pop(id, None)
+        self._new_contacts.pop(id, None)
         del self.persons[id]
         self._writer.effects.append(PersonForgotten(id))
         self._follow(now)
@@ -125,12 +127,7 @@ class People:
 
     def contacts(self) -> dict[str, Probability | None]:
         """Contact of each person for whom it has changed since the last call."""
-        touched, told = self._touched, self._contacts
-        if not touched:
-            return {}
-        changed = {id: now for id in touched if (now := self.persons[id].contact) != told.get(id)}
-        touched.clear()
-        told |= changed
+        changed, self._new_contacts = self._new_contacts, {}
         return changed
 
     # -- steps ---------------------------------------------------------------------------------------------
@@ -145,7 +142,8 @@ class People:
     def observe(self, id: str, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
         """Apply a step that an observation of one person asks for; the person may be new."""
         person = self.person(id)
-        self.apply(id, at, step)
+        self._apply(person, at, step)
+        self._follow(at)
         if person.presence.here or id not in self._unseen:
             self._note(person, at)
 
@@ -173,7 +171,8 @@ class People:
         others are silent: while one speaks, looks of all but that one direct nothing.
         """
         scene = self._scene
-        self._tell_taken_up(at)
+        if scene.taken_up or self._writer.answered:
+            self._tell_taken_up(at)
         while self._unknown != scene.unknown or self._asked != scene.asked:
             self._unknown, self._asked = {**scene.unknown}, {*scene.asked}
             for id in [*scene.questions]:
@@ -201,7 +200,7 @@ class People:
     def _looks_may_direct(self, at: Seconds) -> None:
         """Update the deadlines of those whose looks may direct the robot's now, for what all share has changed."""
         for person in list(self._here.values()):
-            if person.gazes.look_directs_at is not None:
+            if person.gazes.look_directs_at < inf:
                 self._apply(person, at, lambda person: None)
 
     def _apply(self, person: PersonRecognition, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
@@ -216,22 +215,35 @@ class People:
             self.lose_track(person, at)
 
     def _update(self, person: PersonRecognition) -> None:
-        """Note when the person is due, whether the robot waits for its answer, and whether it is here."""
-        id, scene = person.id, self._scene
-        if (question := person.talk.question) is not None:
-            scene.questions[id] = question
-        elif id in scene.questions:
-            del scene.questions[id]
+        """Note when the person is due, whether it is asked, its contact with the robot, and whether it is here."""
+        id, scene, presence = person.id, self._scene, person.presence
+        is_asked = person.talk.is_asked
+        if is_asked or id in scene.asked:
+            self._asks(person, is_asked=is_asked)
         if (since := person.talk.undecided_since) is not None:
             scene.unknown[id] = since
-        elif id in scene.unknown:
-            del scene.unknown[id]
-        (scene.asked.add if person.talk.is_asked else scene.asked.discard)(id)
-        self.agenda.set(id, person.deadline)
-        self._touched.add(id)
-        presence = person.presence
+        elif scene.unknown:
+            scene.unknown.pop(id, None)
+        self.agenda.set(id, None if (due := person.deadline) == inf else due)
+        if (contact := person.contact) != self._contacts.get(id):
+            self._contacts[id] = self._new_contacts[id] = contact
+        if presence.here is not (id in self._here) or presence.reported is not (id in scene.found):
+            self._comes_or_goes(person)
+
+    def _asks(self, person: PersonRecognition, *, is_asked: bool) -> None:
+        """Note whether the robot asks the person, and the question if it waits for the answer."""
+        id, scene, question = person.id, self._scene, person.talk.question
+        if question is not None:
+            scene.questions[id] = question
+        else:
+            scene.questions.pop(id, None)
+        (scene.asked.add if is_asked else scene.asked.discard)(id)
+
+    def _comes_or_goes(self, person: PersonRecognition) -> None:
+        """Note whether the person is here, and whether that is reported."""
+        id, scene, presence = person.id, self._scene, person.presence
         here, was_here = presence.here, id in self._here
-        (scene.found.add if here and presence.reported else scene.found.discard)(id)
+        (scene.found.add if presence.reported else scene.found.discard)(id)
         if was_here and not here:
             del self._here[id]
             scene.present.discard(id)

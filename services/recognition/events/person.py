@@ -1,6 +1,7 @@
 """One person and the robot: what each does becomes input of the recognizers of all kinds of events between them."""
 
-from collections.abc import Iterator
+from math import inf
+from operator import attrgetter
 from typing import NamedTuple
 
 from engage_hri.schemas.behaviors import EVENT_KINDS, Action, EventKind
@@ -9,7 +10,7 @@ from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.gazes import Gazes
 from engage_hri.services.recognition.events.history import ActionHistory
-from engage_hri.services.recognition.events.kinds import KindRecognizer, TimedStep, own_recognizer
+from engage_hri.services.recognition.events.kinds import KindRecognizer, own_recognizer
 from engage_hri.services.recognition.events.machine import EventWriter
 from engage_hri.services.recognition.events.presence import FacePresence
 from engage_hri.services.recognition.events.scene import GazeState, SessionScene
@@ -23,6 +24,9 @@ LONGEST_MANIPULATION: Seconds = 120.0
 """The same for a manipulation. Ours."""
 ACTIONS_KEPT = 64
 """Number of actions of each person for which it is remembered when they last began and ended."""
+
+
+_is_under_way = attrgetter("is_under_way")
 
 
 class _Doing(NamedTuple):
@@ -65,32 +69,23 @@ class PersonRecognition:
     # -- time ---------------------------------------------------------------------------------------------------
 
     @property
-    def deadline(self) -> Seconds | None:
+    def deadline(self) -> Seconds:
         """Time of the next step that is due by itself, unless an input comes before; then call `pass_time`."""
-        gaze, times = self.gazes.gaze, [self.presence.deadline]
+        due, gaze = self.presence.deadline, self.gazes.gaze
         if gaze.targets:
-            times += gaze.deadline, self.gazes.look_directs_at
+            due = min(due, self.gazes.look_directs_at if gaze.ended == inf else gaze.deadline)
         for each in self._recognizers:
-            times += each.deadlines
+            if (at := each.deadline) < due:
+                due = at
         for doing in self._doing.values():
-            times.append(doing.until)
-        known = [at for at in times if at is not None]
-        return min(known) if known else None
-
-    @property
-    def _timed_steps(self) -> Iterator[TimedStep]:
-        """Steps with their times, in the order in which they happen if the times are equal."""
-        yield self.gaze.deadline, self._gaze_expires
-        yield self.presence.deadline, self.leave
-        for each in self._recognizers:
-            yield from each.timed_steps
-        yield self.gazes.look_directs_at, self.gazes.look_directs
-        yield from ((one.until, self._goes_on_too_long) for one in self._doing.values())
+            if doing.until < due:
+                due = doing.until
+        return due
 
     @property
     def is_involved(self) -> bool:
         """True if anything goes on between the person and the robot that the robot's deeds may change."""
-        return any(each.is_under_way for each in self._recognizers)
+        return any(map(_is_under_way, self._recognizers))
 
     @property
     def contact(self) -> Probability | None:
@@ -103,10 +98,16 @@ class PersonRecognition:
 
     def pass_time(self, at: Seconds) -> None:
         """Take the first step that is due at `at`. There is none if something that all share has put it off."""
-        for due, step in self._timed_steps:
-            if due == at:
-                step(at)
-                return
+        if self.gaze.deadline == at:
+            self.gaze_changed(self.gaze.expire())
+        elif self.presence.deadline == at:
+            self.leave(at)
+        elif (due := next((each for each in self._recognizers if each.deadline == at), None)) is not None:
+            due.pass_time(at)
+        elif self.gazes.look_directs_at == at:
+            self.gazes.look_directs(at)
+        else:
+            self._end_overlong(at)
 
     def leave(self, at: Seconds) -> None:
         """Count the person as gone, and close all its open events."""
@@ -187,13 +188,10 @@ class PersonRecognition:
             return LONGEST_SPEECH
         return LONGEST_MANIPULATION if action == "act" else LONGEST_GESTURE
 
-    def _goes_on_too_long(self, at: Seconds) -> None:
+    def _end_overlong(self, at: Seconds) -> None:
         """End actions with a lost end and no later beginning."""
         for action in [action for action, one in self._doing.items() if one.until <= at]:
             self._stops(action, at)
-
-    def _gaze_expires(self, at: Seconds) -> None:
-        self.gaze_changed(self.gaze.expire())
 
     def gaze_changed(self, at: Seconds) -> None:
         """Take a change of the person's gaze."""
@@ -213,10 +211,6 @@ class PersonRecognition:
     def recognizer(self, kind: EventKind) -> KindRecognizer:
         """Recognizer of the events of this kind."""
         return self._by_kind[kind]
-
-    def waits_for(self, block: str, name: str) -> bool:
-        """True if a time limit runs from this sync point of a block of the robot."""
-        return any(each.waits_for(block, name) for each in self._recognizers)
 
     def point_realised(self, block: str, name: str, at: Seconds) -> None:
         """Take a realised sync point of a block of the robot: time limits may run from there."""

@@ -6,6 +6,8 @@ counts as gone only after `FACE_GRACE` seconds (decision 0106). Times decide her
 that is reported after the person was seen again changes nothing.
 """
 
+from math import inf
+
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.reports.action_reports import FACE_GRACE
 
@@ -23,9 +25,9 @@ class FacePresence:
         self._found_last = self._seen_last = self._lost_last = self.left_at = NEVER
 
     @property
-    def deadline(self) -> Seconds | None:
-        """Time at which the person has gone, unless it is seen again before; then call `leave`."""
-        return None if self._lost_at is None else self._lost_at + FACE_GRACE
+    def deadline(self) -> Seconds:
+        """Time at which the person has gone, unless it is seen again before; then call `leave`. Infinite: never."""
+        return inf if self._lost_at is None else self._lost_at + FACE_GRACE
 
     def seen(self, at: Seconds) -> bool:
         """Take an observation at `at` that shows the person is there. False if it is from before the person left."""

@@ -77,11 +77,14 @@ class TakenUp(NamedTuple):
 
 
 class GazeState(Struct):
-    """Look of an actor, and its start. ended: time at which it ended, unless the same look begins again at once."""
+    """Look of an actor, and its start.
+
+    ended: time at which it ended, unless the same look begins again at once; infinite: it goes on.
+    """
 
     targets: tuple[str, ...] = ()
     since: Seconds = 0.0
-    ended: Seconds | None = None
+    ended: Seconds = inf
     confidence: Probability = 1.0
     spent: bool = False
     """True if this look answers the robot, or has directed it already: it does not direct it (again)."""
@@ -90,10 +93,10 @@ class GazeState(Struct):
         """Begin a look at `targets`. True if that is a change; a look older than the present one is ignored."""
         if at < self.since:
             return False
-        if targets == self.targets and (self.ended is None or at - self.ended <= SAME_INSTANT):
-            self.ended = None
+        if targets == self.targets and at - self.ended <= SAME_INSTANT:
+            self.ended = inf
             return False
-        self.targets, self.since, self.ended, self.spent = targets, at, None, False
+        self.targets, self.since, self.ended, self.spent = targets, at, inf, False
         self.confidence = confidence
         return True
 
@@ -103,14 +106,13 @@ class GazeState(Struct):
             self.ended = at
 
     @property
-    def deadline(self) -> Seconds | None:
-        return None if self.ended is None else self.ended + SAME_INSTANT
+    def deadline(self) -> Seconds:
+        return self.ended + SAME_INSTANT
 
     def expire(self) -> Seconds:
         """Let the ended look be over. Returns the time of its end."""
-        assert self.ended is not None
         at = self.ended
-        self.targets, self.since, self.ended, self.spent = (), at, None, False
+        self.targets, self.since, self.ended, self.spent = (), at, inf, False
         return at
 
 
@@ -171,7 +173,7 @@ class SessionScene:
 
         True if something may count as an object now that did not before, or no longer.
         """
-        people, known = set(), len(self._objects)
+        people, known, others = set(), len(self._objects), self._others
         for entity in world.entities:
             id, kind = entity.id, entity.kind
             if kind == "object":
@@ -179,15 +181,21 @@ class SessionScene:
             elif kind == "surface":
                 self._surfaces.add(id)
             else:
-                self._others.pop(id, None)
-                self._others[id] = at
+                others.pop(id, None)
+                others[id] = at
                 if kind == "person" and id != self.robot:
                     people.add(id)
-                    if entity.name or id not in self.people_in_world:
-                        self.names |= {name.casefold(): id for name in (id, entity.name) if name}
+                    if entity.name:
+                        self.call(id, entity.name)
         if people != self.people_in_world:
             self.people_in_world = frozenset(people)
         return not known or len(self._objects) > known
+
+    def call(self, id: str, *names: str) -> None:
+        """Note names by which people call somebody: as an id is written, and as it is spoken."""
+        for name in names:
+            plain = name.casefold()
+            self.names |= {plain: id, " ".join(plain.replace("_", " ").split()): id}
 
     def told_to(self, person: str, since: Seconds) -> Addressees | None:
         """Addressees of a speech by perception, if they were told before the speech; None: they were not."""
@@ -300,11 +308,11 @@ class SessionScene:
         self.acting.discard(actor)
         self.falls_silent(actor, at)
 
-    def others_silent_since(self, actor: str) -> Seconds | None:
-        """Time since when all but `actor` are silent; None while another speaks."""
-        if self._speakers - {actor}:
-            return None
-        return max((at for at, other in self._fell_silent if other != actor), default=float("-inf"))
+    def others_silent_since(self, actor: str) -> Seconds:
+        """Time since when all but `actor` are silent; infinite while another speaks."""
+        if len(self._speakers) > (actor in self._speakers):
+            return inf
+        return max((at for at, other in self._fell_silent if other != actor), default=-inf)
 
     def knows(self, entity: str) -> bool:
         """True if the entity has ever been seen, or if no object has been seen yet."""
@@ -320,7 +328,7 @@ class SessionScene:
 
     def person_looks_at(self, gaze: GazeState, objects: tuple[str, ...]) -> bool:
         """True if a person's look counts as one at `objects`: at resolution `table` a look at anything there does."""
-        if any(target in objects for target in gaze.targets):
+        if any(map(objects.__contains__, gaze.targets)):
             return True
         if self.resolution == "object":
             return False
@@ -332,7 +340,7 @@ class SessionScene:
         return any(one.actor == actor and (one.left or one.piece in targets) for one in self.covered.by)
 
     def robot_looks_at(self, entities: tuple[str, ...]) -> bool:
-        return any(target in entities for target in self.gaze.targets)
+        return any(map(entities.__contains__, self.gaze.targets))
 
     def robot_since(self, entities: tuple[str, ...]) -> Seconds | None:
         """Start of the robot's look at one of the entities; None if it looks elsewhere."""

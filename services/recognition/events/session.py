@@ -8,8 +8,9 @@ The times of the observations decide, not those of their arrival: a step that wa
 before it, at its own time. An answer exactly at the limit still counts.
 """
 
-from collections.abc import Callable, Container, Set
-from typing import get_args
+from collections.abc import Callable, Container, Iterable, Set
+from math import inf
+from typing import Any, get_args
 
 from engage_hri.schemas.behaviors import EVENT_KINDS, Action, Event, TurnSignal
 from engage_hri.schemas.blocks import BlockProgress, SyncPointProgress
@@ -29,7 +30,7 @@ from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING,
 from engage_hri.services.recognition.events.machine import Effect, EventWriter, Mishap, OngoingEvent
 from engage_hri.services.recognition.events.people import People
 from engage_hri.services.recognition.events.person import PersonRecognition
-from engage_hri.services.recognition.events.scene import Covered, SessionScene, Worded
+from engage_hri.services.recognition.events.scene import SAME_INSTANT, Covered, SessionScene, Worded
 from engage_hri.services.recognition.events.talk import Step
 from engage_hri.services.reports.ongoing_actions import GoesOn
 
@@ -75,8 +76,8 @@ class Session:
         """Present speech and gestures of the robot, by behavior."""
         self._heard_at: Seconds | None = None
         """Time when the robot's body last showed that it speaks."""
-        self._live: dict[str, OngoingEvent] = {}
-        """Undecided requests."""
+        self._live: dict[str, tuple[OngoingEvent, LimitClock | None]] = {}
+        """Undecided requests, with the clocks of their limits."""
         self._answering_blocks: Latest[str, str] = Latest(BLOCKS_KEPT)
         """Blocks that answer a person, with the id of that person (empty: all)."""
         self._history = ActionHistory(ACTIONS_KEPT)
@@ -85,6 +86,14 @@ class Session:
         """To whom the robot speaks in each block."""
         self._turn: tuple[str, Addressees] | None = None
         """The robot's turn that has not ended, and to whom it is."""
+        self._takes: dict[type, Callable[[Any, Seconds], object]] = {
+            ActionBegan: self._begins, ActionEnded: self._ends, GoesOn: self._goes_on,
+            ActorFound: self._found, ActorLost: self._lost, World: self._people.see, Covered: self._hands_changed,
+            Worded: self._understand, RequestEvent: self._request, SignalTurn: self._signal, Cancel: self._cancel,
+            SyncPointProgress: self._point_realised, BlockProgress: self._block_progresses,
+            RobotState: self._robot_is_heard, HeadOwner: self._head_owner_changed,
+        }  # fmt: skip
+        """What each kind of observation changes."""
 
     @property
     def persons(self) -> dict[str, PersonRecognition]:
@@ -119,26 +128,24 @@ class Session:
     @property
     def deadline(self) -> Seconds | None:
         """Time at which `advance` has something to do, unless an observation comes first."""
-        people = self._people.agenda.earliest
-        if self.scene.gaze.ended is None:
-            return people
-        gaze = self.scene.gaze.deadline
-        return people if gaze is None or (people is not None and people < gaze) else gaze
+        due = self._due
+        return None if due == inf else due
+
+    @property
+    def _due(self) -> Seconds:
+        """The deadline; infinite: there is none."""
+        people, gaze = self._people.agenda.look, self.scene.gaze.ended + SAME_INSTANT
+        return people if people < gaze else gaze
 
     def advance(self, now: Seconds) -> list[Effect]:
         """Take all steps that are due up to and including `now`."""
-        while (due := self.deadline) is not None and due <= now:
+        while (due := self._due) <= now:
             self._take_step(due)
         self._people.forget(now)
         return self._take()
 
-    def _advance_before(self, at: Seconds) -> None:
-        while (due := self.deadline) is not None and due < at - ROUNDING:
-            self._take_step(due)
-        self._people.forget(at)
-
     def _take_step(self, due: Seconds) -> None:
-        if due == self.scene.gaze.deadline:
+        if due == self.scene.gaze.ended + SAME_INSTANT:
             self._robot_gaze_changed(self.scene.gaze.expire())
         else:
             self._people.advance()
@@ -147,57 +154,48 @@ class Session:
 
     def feed(self, observation: Observation | Covered, at: Seconds) -> list[Effect]:
         """Take an observation of what happened at `at`. Slightly late or repeated ones are put right or ignored."""
-        self._advance_before(at)
-        match observation:  # what comes most often first
-            case ActionBegan(actor=self.robot):
-                self._robot_begins(observation, at)
-            case ActionEnded(actor=self.robot):
-                self._robot_ends(observation, at)
-            case ActionBegan(actor=actor):
-                self._people.observe(actor, at, lambda person: person.begins(observation, at))
-            case ActionEnded(actor=actor) if actor in self.persons:
-                self._people.observe(actor, at, lambda person: person.ends(observation, at))
-            case World():
-                self._people.see(observation, at)
-            case SyncPointProgress(block=block):
-                name = self.blocks.realised(block, observation.behavior, observation.sync, at)
-                asked = {event.responder for event in self._live.values() if event.block == block}
-                for id in asked & self.persons.keys():
-                    if self.persons[id].waits_for(block, name):
-                        self._people.apply(id, at, lambda person: person.point_realised(block, name, at))
-            case GoesOn(began=ActionBegan(actor=self.robot)):
-                self._robot_goes_on(observation.began, observation.since, at)
-            case GoesOn(began=began, since=since):
-                self._people.observe(began.actor, at, lambda person: person.goes_on(began, since, at))
-            case ActorFound(actor=actor) if actor != self.robot:
-                self._people.observe(actor, at, lambda person: person.presence.found(at))
-            case ActorLost(actor=actor) if actor in self.persons:
-                self._people.observe(actor, at, lambda person: person.presence.lost(at))
-            case Worded(actor=actor, since=since):
-                if observation.is_line:
-                    self.scene.lines[actor] = since
-                self._understand(observation, at)
-            case RequestEvent():
-                self._request(observation, at)
-            case SignalTurn():
-                self._signal(observation, at)
-            case Cancel():
-                self._cancel(observation, at)
-            case BlockProgress(block=str() as block, progress="start"):
-                self._block_begins(block, at)
-            case BlockProgress(block=str() as block, progress="end"):
-                self._block_ended(block, at, aborted=observation.status in ("failed", "interrupted"))
-            case RobotState(speaking=said):
-                self._robot_is_heard(bool(said), at)
-            case HeadOwner(owner=owner):
-                self.scene.head_owner = owner
-                self._people.apply_to_all(
-                    at, lambda person: person.gazes.head_owner_changed(at), lambda person: person.gazes.is_under_way
-                )
-            case Covered():
-                self.scene.covered = observation
-                self._people.apply_to_all(at, lambda person: person.gazes.hands_changed())
+        while (due := self._due) < at - ROUNDING:
+            self._take_step(due)
+        self._people.forget(at)
+        self._takes[type(observation)](observation, at)
         return self._take()
+
+    def _begins(self, began: ActionBegan, at: Seconds) -> None:
+        if began.actor == self.robot:
+            self._robot_begins(began, at)
+        else:
+            self._people.observe(began.actor, at, lambda person: person.begins(began, at))
+
+    def _ends(self, ended: ActionEnded, at: Seconds) -> None:
+        if ended.actor == self.robot:
+            self._robot_ends(ended, at)
+        elif ended.actor in self.persons:
+            self._people.observe(ended.actor, at, lambda person: person.ends(ended, at))
+
+    def _goes_on(self, observation: GoesOn, at: Seconds) -> None:
+        began, since = observation.began, observation.since
+        if began.actor == self.robot:
+            self._robot_goes_on(began, since, at)
+        else:
+            self._people.observe(began.actor, at, lambda person: person.goes_on(began, since, at))
+
+    def _found(self, found: ActorFound, at: Seconds) -> None:
+        if found.actor != self.robot:
+            self._people.observe(found.actor, at, lambda person: person.presence.found(at))
+
+    def _lost(self, lost: ActorLost, at: Seconds) -> None:
+        if lost.actor in self.persons:
+            self._people.observe(lost.actor, at, lambda person: person.presence.lost(at))
+
+    def _hands_changed(self, covered: Covered, at: Seconds) -> None:
+        self.scene.covered = covered
+        self._people.apply_to_all(at, lambda person: person.gazes.hands_changed())
+
+    def _head_owner_changed(self, head: HeadOwner, at: Seconds) -> None:
+        self.scene.head_owner = head.owner
+        self._people.apply_to_all(
+            at, lambda person: person.gazes.head_owner_changed(at), lambda person: person.gazes.is_under_way
+        )
 
     def resume(self, former: ConnectionEvent, at: Seconds) -> list[Effect]:
         """Go on with a pair that a former life has begun. The end of its turn is not known: it counts as over now.
@@ -233,7 +231,7 @@ class Session:
 
     def _lose_untold(self, person: str, at: Seconds) -> None:
         """End the events that were asked for and not begun yet: a bug has shown before, or while they waited."""
-        for event in list(self._live.values()):
+        for event, _ in list(self._live.values()):
             if not event.id and event.request and person in (event.initiator, event.responder):
                 self._writer.publish(event, "started", at)
                 self._writer.publish(event, "lost", at)
@@ -241,13 +239,12 @@ class Session:
     def _take(self) -> list[Effect]:
         if not self._writer.effects:
             return []
-        for mishap in [effect for effect in self._writer.effects if isinstance(effect, Mishap)]:
-            self._lose_untold(mishap.actor, mishap.at)
-        effects = self._writer.take()
-        for effect in effects:
+        for effect in self._writer.effects:  # of which there may be more meanwhile
             if isinstance(effect, EventOutcome):
                 self._live.pop(effect.id, None)
-        return effects
+            elif isinstance(effect, Mishap):
+                self._lose_untold(effect.actor, effect.at)
+        return self._writer.take()
 
     # -- what the robot does ------------------------------------------------------------------------------------
 
@@ -338,6 +335,8 @@ class Session:
 
     def _understand(self, words: Worded, at: Seconds) -> None:
         """Take the words of a person's speech, and to whom perception says that they are."""
+        if words.is_line:
+            self.scene.lines[words.actor] = words.since
         if words.to is not None:
             self.scene.tells_addressees = True
             self.scene.told_addressees[words.actor, words.since] = words.to
@@ -350,9 +349,9 @@ class Session:
             )
         self._writer.interject_again(words.actor, words.since, at)
 
-    def _robot_is_heard(self, is_speaking: bool, at: Seconds) -> None:
+    def _robot_is_heard(self, state: RobotState, at: Seconds) -> None:
         """End speech with a lost end: the body showed that it speaks, and for `SILENCE` no longer does."""
-        if is_speaking:
+        if state.speaking:
             self._heard_at = at
         elif self._heard_at is not None and at > self._heard_at + SILENCE:
             self._heard_at = None
@@ -394,15 +393,27 @@ class Session:
             accept=wanted.accept or ACCEPT,
         )  # fmt: skip
         self._writer.effects.append(Accepted(id=request.id, within=self._within(event, wanted)))
-        self._live[request.id] = event
+        clock = self._clock(event, wanted)
+        self._live[request.id] = event, clock
         self.announce(request)
-        self._people.apply(wanted.responder, at, lambda person: self._begin(person, event, wanted))
+        self._people.apply(wanted.responder, at, lambda person: self._begin(person, event, clock))
 
-    def _begin(self, person: PersonRecognition, event: OngoingEvent, wanted: Event) -> None:
+    def _begin(self, person: PersonRecognition, event: OngoingEvent, clock: LimitClock | None) -> None:
         """Begin the robot's event with this person."""
         opens_turn = event.kind == "adjacency_pair"
         ended = self._begins_turn(event) if opens_turn else self.blocks.ended.get(event.block)
-        person.recognizer(event.kind).robot_asks(event, self._clock(event, wanted), ended)
+        person.recognizer(event.kind).robot_asks(event, clock, ended)
+
+    def _waiting_for(self, block: str, name: str) -> Iterable[str]:
+        """Persons with a time limit that runs from this sync point of a block of the robot."""
+        return dict.fromkeys(
+            event.responder
+            for event, clock in self._live.values()
+            if clock is not None
+            and event.block == block
+            and clock.waits_for(name)
+            and event.responder in self.persons
+        )
 
     def _fault_in(self, request: RequestEvent) -> Fault | None:
         event, where = request.event, f"{request.block}: {request.event.id}"
@@ -448,7 +459,8 @@ class Session:
 
     def _begins_turn(self, event: OngoingEvent) -> Seconds | None:
         """Note the first turn of a pair, and whether it is to others, too. Returns when it was over, if it is."""
-        asked = [each for each in self._live.values() if each.kind == "adjacency_pair" and each.turn == event.turn]
+        live = (each for each, _ in self._live.values())
+        asked = [each for each in live if each.kind == "adjacency_pair" and each.turn == event.turn]
         for each in asked if event.turn and len(asked) > 1 else ():
             each.is_to_several = True
         self._speaks_to(event.responder, event.block, event.started)
@@ -476,7 +488,7 @@ class Session:
             self._turn = None
 
     def _cancel(self, cancel: Cancel, at: Seconds) -> None:
-        event = self._live.pop(cancel.id, None)
+        event, _ = self._live.pop(cancel.id, (None, None))
         if event is not None and event.request == cancel.id:
             is_orphan = cancel.cause in ORPHANING
             who = event.initiator if event.responder == self.robot else event.responder
@@ -524,6 +536,18 @@ class Session:
     def _tell(self, actor: str, at: Seconds, step: Step) -> None:
         """Tell what happens to the conversation with a known person, or with all (actor: empty)."""
         self._apply_to_addressees(actor, at, lambda person: person.talk.take(at, step))
+
+    def _point_realised(self, point: SyncPointProgress, at: Seconds) -> None:
+        block = point.block
+        name = self.blocks.realised(block, point.behavior, point.sync, at)
+        for id in self._waiting_for(block, name):
+            self._people.apply(id, at, lambda person: person.point_realised(block, name, at))
+
+    def _block_progresses(self, told: BlockProgress, at: Seconds) -> None:
+        if told.block is not None and told.progress == "start":
+            self._block_begins(told.block, at)
+        elif told.block is not None and told.progress == "end":
+            self._block_ended(told.block, at, aborted=told.status in ("failed", "interrupted"))
 
     def _block_begins(self, block: str, at: Seconds) -> None:
         """Forget an earlier block of this id, and an earlier turn: a turn is called like the block that opens it."""

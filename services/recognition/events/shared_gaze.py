@@ -10,6 +10,7 @@ event of its own (decision 0187).
 """
 
 from collections.abc import Callable, Iterator
+from math import inf
 from typing import ClassVar, NamedTuple
 
 from engage_hri.schemas.recognition import EventState
@@ -56,9 +57,9 @@ class SharedGaze(Machine):
         """What the robot has asked for while the person waits."""
 
     @property
-    def deadline(self) -> Seconds | None:
+    def deadline(self) -> Seconds:
         if self._clock is None or self.state not in (ROBOT_COMING, self.ROBOT_WAITS, self.HUMAN_WAITS):
-            return None
+            return inf
         return self._clock.deadline
 
     @property

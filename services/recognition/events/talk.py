@@ -9,7 +9,8 @@ A sound into the robot's own words is decided by the conversation, which knows w
 """
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from math import inf
 
 from engage_hri.schemas.behaviors import EVENT_KINDS, Action, Event
 from engage_hri.schemas.perception import ActionBegan
@@ -26,7 +27,7 @@ from engage_hri.services.recognition.events.addressing import (
 )
 from engage_hri.services.recognition.events.conversation import Conversation
 from engage_hri.services.recognition.events.history import Latest
-from engage_hri.services.recognition.events.kinds import KindRecognizer, TimedStep
+from engage_hri.services.recognition.events.kinds import KindRecognizer
 from engage_hri.services.recognition.events.limits import ROUNDING, LimitClock
 from engage_hri.services.recognition.events.machine import EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import Question, SessionScene
@@ -97,22 +98,21 @@ class Talk(KindRecognizer):
     # -- time ---------------------------------------------------------------------------------------------------
 
     @property
-    def deadlines(self) -> tuple[Seconds | None, ...]:
-        return (self._decided_at,) if self._line else self._conversation.deadlines
+    def deadline(self) -> Seconds:
+        return self._decided_at if self._line else self._conversation.deadline
 
-    @property
-    def timed_steps(self) -> Iterator[TimedStep]:
+    def pass_time(self, at: Seconds) -> None:
         if self._line:
-            yield self._decided_at, self.go_on
+            self.go_on(at)
         else:
-            yield from self._conversation.timed_steps
+            self._conversation.pass_time(at)
 
     @property
-    def _decided_at(self) -> Seconds | None:
-        """Time at which the first speech in line is decided; None: it is, and waits."""
+    def _decided_at(self) -> Seconds:
+        """Time at which the first speech in line is decided; infinite: it is, and waits."""
         _, speech = self._line[0]
         if not isinstance(speech, OwnSpeech) or self._is_known(speech):
-            return None
+            return inf
         if speech.until is None:
             return speech.since + self._scene.longest_unknown
         may_call = self._scene.is_worded and not speech.faces.most(speech.since)
@@ -364,7 +364,7 @@ class Talk(KindRecognizer):
             return False
         decided_at, since = self._decided_at, self.undecided_since
         assert since is not None
-        return not self._waits_for_others(since) if decided_at is None else decided_at <= now
+        return not self._waits_for_others(since) if decided_at == inf else decided_at <= now
 
     def go_on(self, now: Seconds) -> None:
         """Tell all in line up to the next speech of which it is not known to whom it is."""
@@ -386,5 +386,5 @@ class Talk(KindRecognizer):
     def _catch_up(self, until: Seconds) -> None:
         """Take the steps of the conversation that were due before `until`."""
         last = until - ROUNDING
-        while (due := min((at for at in self._conversation.deadlines if at is not None), default=until)) < last:
-            next(step for at, step in self._conversation.timed_steps if at == due)(due)
+        while (due := self._conversation.deadline) < last:
+            self._conversation.pass_time(due)

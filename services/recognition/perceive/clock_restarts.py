@@ -1,8 +1,13 @@
 """Clocks of reporters that jump back: a camera that was restarted, or whose machine has been set. Pure.
 
 All that such a reporter tells is older by its stamps than what it told before. Taken at its word it would be late
-news for as long as the jump was wide: a person would be half heard for ten minutes. A single late message looks the
-same; so a jump is believed once some messages in a row are behind, or one that is too old to be late.
+news for as long as the jump was wide: a person would be half heard for ten minutes.
+
+What tells a jump from late messages is the age at which messages come: after a jump each is as old as the jump was
+wide, and it stays so. Late messages are late by `LATE` at most, or overtaken by one in time. Those that have waited
+for a link come faster than they were told, so that each is less old than the one before. So a jump is believed once
+some messages in a row are too old, and all equally so for a while; and at once if one is a minute behind the latest.
+Their order shows a jump as well, but only if they are many: if not, the while is as long as the jump was wide.
 """
 
 from msgspec import Struct
@@ -11,20 +16,55 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.reports.action_reports import OLDEST
 
-BACK: Seconds = 2.0
-"""Time by which a stamp has to be behind the latest of its reporter: late messages are so as well. Ours."""
+LATE: Seconds = 2.5
+"""Time by which a message may come later than the fastest of its reporter. Ours."""
 IN_A_ROW = 3
-"""Number of such messages after which the clock is taken for restarted. Ours."""
+"""Least number of messages, all too old, after which the clock is taken for restarted. Ours."""
+WHILE: Seconds = 0.5
+"""Least time from the first to the last of them. Ours."""
+CATCHING_UP = 0.5
+"""Share of that time by which their age has fallen if they have only waited: they come faster than they were told.
+Ours."""
 REPORTERS_KEPT = 256
 
 
+class _Row(Struct):
+    """Messages in a row that came too old, and about equally so.
+
+    since: when the first came. age: of the first. least: of all. lasts: for how long they have to come.
+    """
+
+    since: Seconds
+    age: Seconds
+    least: Seconds
+    lasts: Seconds
+    number: int = 0
+
+
 class _Clock(Struct):
-    """A clock as one reporter tells it. latest: of its stamps. ahead: time by which it has been set back."""
+    """A clock as one reporter tells it. latest: of its stamps. ahead: time by which it has been set back.
+
+    way: least age at which a message has come.
+    """
 
     latest: Seconds
+    way: Seconds
     ahead: Seconds = 0.0
-    behind: int = 0
-    """Number of messages in a row that were behind the latest."""
+    row: _Row | None = None
+
+    def is_restarted(self, stamp: Seconds, age: Seconds, now: Seconds) -> bool:
+        """True if the clock has jumped back by now. age: of a message that has just come with this stamp."""
+        if age <= self.way + LATE:
+            self.row, self.way = None, max(0.0, min(self.way, age))
+            return False
+        if self.row is None or abs(age - self.row.age) > LATE:
+            is_behind = stamp < self.latest - LATE
+            self.row = _Row(now, age, age, WHILE if is_behind else max(WHILE, age - self.way))
+        row, lasts = self.row, now - self.row.since
+        row.number += 1
+        row.least = min(row.least, age)
+        stays = lasts >= row.lasts and row.age - age <= CATCHING_UP * lasts
+        return stamp < self.latest - OLDEST or (row.number >= IN_A_ROW and stays)
 
 
 class ClockRestarts:
@@ -38,16 +78,15 @@ class ClockRestarts:
 
         local: its time by the clocks as the bus knows them. now: when the message came, in seconds on the same clock.
         """
-        key = (reporter, stamp.clock)
+        key, age = (reporter, stamp.clock), now - local
         clock = self._clocks.get(key)
         if clock is None:
-            self._clocks[key] = clock = _Clock(stamp.seconds)
-        back = clock.latest - stamp.seconds
-        clock.behind = clock.behind + 1 if back > BACK else 0
-        if back > OLDEST or clock.behind == IN_A_ROW:
-            clock.ahead, clock.latest, clock.behind = now - local, stamp.seconds, 0
-        elif local + clock.ahead > now + BACK:
+            self._clocks[key] = clock = _Clock(stamp.seconds, max(0.0, age))
+        if age - clock.ahead < -LATE:
             clock.ahead = 0.0  # it has been set right again
+        if clock.is_restarted(stamp.seconds, age - clock.ahead, now) and clock.row is not None:
+            clock.ahead += clock.row.least - clock.way
+            clock.latest, clock.row = stamp.seconds, None
         clock.latest = max(clock.latest, stamp.seconds)
 
     def ahead(self, reporter: str, clock: str) -> Seconds:

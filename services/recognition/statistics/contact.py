@@ -25,11 +25,15 @@ class ContactShare:
         self._share: Probability = 0.0
         self._at: Seconds = -math.inf
 
-    def change(self, now: Probability, at: Seconds) -> None:
-        """Take how much of a contact there is from `at` on."""
-        self._share = now if self.now is None else self.share(at)
+    def change(self, now: Probability | None, at: Seconds) -> None:
+        """Take how much of a contact there is from `at` on; None: that is not known any longer."""
+        self._share = (now or 0.0) if self.now is None else self.share(at)
         self._at = max(at, self._at)
         self.now = now
+
+    def resume(self, now: Probability | None, share: Probability, at: Seconds) -> None:
+        """Go on from what was known at `at`."""
+        self.now, self._share, self._at = now, share, at
 
     def share(self, at: Seconds) -> Probability:
         """Share of contact until `at`. It is 0 as long as nothing has told of contact."""

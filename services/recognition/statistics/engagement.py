@@ -11,9 +11,10 @@ The levels are those of ROS4HRI: at the first sign of contact a person is `engag
 still, or again, in contact a while later; who drifts away is `disengaging` first.
 """
 
+from math import inf
 from typing import Literal, NamedTuple
 
-from engage_hri.schemas.recognition import EngagementLevel
+from engage_hri.schemas.recognition import EngagementLevel, Statistics
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import HYSTERESIS, RecognitionConfig
 from engage_hri.services.recognition.statistics.contact import CONTACT_MEMORY, ContactShare
@@ -82,30 +83,43 @@ class Engagement:
         self._config = config
         self._tally = tally
         self._robot = robot
-        self._busy_until: Seconds = float("-inf")
-        self._apart_since: Seconds = float("-inf")
+        self.busy_until: Seconds = -inf
+        self.apart_since: Seconds = -inf
         """Time at which the last contact ended."""
-        self._engaging_since: Seconds = float("-inf")
+        self.level_since: Seconds = -inf
 
-    def touch(self, much: Probability, at: Seconds) -> None:
-        """Take how much of a contact there is from `at` on."""
-        if (self.contact.now or 0.0) >= IN_CONTACT > much:
-            self._apart_since = at
+    def resume(self, former: Statistics) -> None:
+        """Go on from what a former life has told: all that goes on now went on meanwhile."""
+        self.estimate = EngagementEstimate(former.engagement, former.level, former.reasons)
+        self.busy = former.busy
+        self.contact.resume(former.contact.now, former.contact.share, former.at.seconds)
+        self.busy_until, self.apart_since, self.level_since = (
+            -inf if at is None else at.seconds for at in (former.busy_until, former.contact.ended, former.level_since)
+        )
+
+    def touch(self, much: Probability | None, at: Seconds) -> None:
+        """Take how much of a contact there is from `at` on; None: that is not known any longer."""
+        if (self.contact.now or 0.0) >= IN_CONTACT > (much or 0.0):
+            self.apart_since = at
         self.contact.change(much, at)
 
     def update(self, now: Seconds, *, busy: bool) -> EngagementEstimate:
         """Update the estimate, and return it. busy: True freezes it as it was when the task began."""
         if self.busy and not busy:
-            self._busy_until = now
+            self.get_free(now)
         if not (self.busy and busy):
             before, self.estimate = self.estimate, self._estimate(now)
-            if self.estimate.level == "engaging" != before.level:
-                self._engaging_since = now
+            if self.estimate.level != before.level:
+                self.level_since = now
         if busy and not self.busy:
             reasons = ("busy with a task: estimate frozen", *self.estimate.reasons)
             self.estimate = self.estimate._replace(reasons=reasons)
         self.busy = busy
         return self.estimate
+
+    def get_free(self, now: Seconds) -> None:
+        """Take the end of the task. The estimate is the frozen one until it is updated."""
+        self.busy, self.busy_until = False, now
 
     def news(self, now: Seconds) -> Literal["", "value", "level"]:
         """Change since it was told: of the level, or by contact alone of the value; "": neither."""
@@ -131,7 +145,7 @@ class Engagement:
             return UNKNOWN
         value = sum(known) / len(known)
         is_in_contact = self.contact.now is None or self.contact.now >= IN_CONTACT
-        lasts = is_in_contact and now >= self._engaging_since + ENGAGES_AFTER
+        lasts = is_in_contact and now >= self.level_since + ENGAGES_AFTER
         level = next_level(self.estimate.level, value, self._config, lasts=lasts)
         return EngagementEstimate(value, level, tuple(reasons))
 
@@ -153,7 +167,7 @@ class Engagement:
         last = self._tally.starts.last
         if last is None or (self.contact.now or 0.0) >= IN_CONTACT:
             return 0.0
-        return max(0.0, now - max(last, self._busy_until, self._apart_since))
+        return max(0.0, now - max(last, self.busy_until, self.apart_since))
 
     @property
     def _usual(self) -> Seconds:
@@ -165,7 +179,7 @@ class Engagement:
     @property
     def _recent_from(self) -> Seconds:
         """Time from which on the recent window holds no time in which the actor was busy."""
-        return self._busy_until + self._config.window
+        return self.busy_until + self._config.window
 
     def next_change(self, now: Seconds) -> Seconds | None:
         """Time at which to look whether the level has changed by itself; None: it does not.
@@ -174,7 +188,9 @@ class Engagement:
         """
         if self.busy or self.estimate.level == "unknown":
             return None
-        changes = [self._recent_from, self._engaging_since + ENGAGES_AFTER]
+        changes = [self._recent_from]
+        if self.estimate.level == "engaging":
+            changes.append(self.level_since + ENGAGES_AFTER)
         if self.contact.now is None:
             changes += self._level_falls(now)
         elif not self.contact.is_settled(now) or not (self.contact.now >= IN_CONTACT or self._is_low):

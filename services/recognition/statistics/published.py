@@ -9,14 +9,14 @@ the numbers of the end only, as after a replay, asks for them then (`overall`), 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Set
 from functools import partial
-from math import inf
+from math import inf, isfinite
 
-from engage_hri.schemas.recognition import ConnectionEvent, Statistics
+from engage_hri.schemas.recognition import ConnectionEvent, Contact, Statistics
 from engage_hri.schemas.units import Probability, Seconds, Stamp
 from engage_hri.services.bus.deadlines import Deadlines
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import PersonForgotten
-from engage_hri.services.recognition.statistics.engagement import Engagement, EngagementEstimate
+from engage_hri.services.recognition.statistics.engagement import Engagement
 from engage_hri.services.recognition.statistics.tally import EventTally
 
 TOGETHER = ""
@@ -38,9 +38,14 @@ class _ActorStatistics:
         """True if that is to be told at once."""
         self.leaves: Seconds = inf
         """Time at which the next event leaves the recent window that was told."""
+        self.held_until: Seconds = inf
+        """Time until which contact is what it was in a former life, unless something tells of it before."""
 
     def look(self, now: Seconds) -> None:
         """Take what changes by the passing of time."""
+        if self.held_until <= now:
+            self.engagement.touch(None, self.held_until)
+            self.held_until = inf
         news = self.engagement.news(now)
         self.is_new = self.is_new or self.leaves <= now or news == "value"
         self.is_urgent = self.is_urgent or news == "level"
@@ -50,7 +55,8 @@ class _ActorStatistics:
 
     def next_look(self, now: Seconds) -> Seconds | None:
         """Time at which it next changes by itself, or what has changed is to be told."""
-        changes = [self.told_at + TOLD_EVERY if self.is_new else self.leaves, self.engagement.next_change(now)]
+        sooner = self.told_at + TOLD_EVERY if self.is_new else self.leaves
+        changes = [sooner, self.held_until, self.engagement.next_change(now)]
         return min((at for at in changes if at is not None and at < inf), default=None)
 
 
@@ -66,11 +72,13 @@ class PublishedStatistics:
         """Actors of whom something has come in since `told` was last called."""
         self._agenda: Deadlines[str] = Deadlines(str)
         self._busy: frozenset[str] = frozenset()
+        self._held_busy: dict[str, Seconds] = {}
+        """Persons who were busy in a former life, each until when that holds unless something tells of it before."""
 
     @property
     def deadline(self) -> Seconds | None:
         """Time at which `told` has something to do, though nothing has come in."""
-        return self._agenda.earliest
+        return None if self._agenda.look == inf else self._agenda.look
 
     def feed(
         self,
@@ -84,8 +92,10 @@ class PublishedStatistics:
         busy: persons with a task in hand. contacts: how much of a contact there is now, where that may have changed.
         """
         for actor, much in contacts.items():
-            if much is not None and self._actors[actor].engagement.contact.now != much:
-                self._actors[actor].engagement.touch(much, now)
+            one = self._actors[actor]
+            one.held_until = inf
+            if one.engagement.contact.now != much:
+                one.engagement.touch(much, now)
                 self._changed.add(actor)
         for change in changes:
             if isinstance(change, PersonForgotten):
@@ -98,17 +108,32 @@ class PublishedStatistics:
                 one.tally.feed(change)
                 one.is_new = True
                 self._changed.add(name)
+        if self._held_busy:
+            self._held_busy = {id: until for id, until in self._held_busy.items() if id not in busy and now < until}
+            busy = busy | self._held_busy.keys()
         if busy != self._busy:
             self._get_busy(frozenset(busy), now)
 
     def resume(self, former: Statistics, now: Seconds) -> None:
-        """Go on from the numbers of a former life. Its contacts and recent events are not known."""
-        name = former.actor
-        one = self._actors[name] = _ActorStatistics(self._config, self._clock, self._robot)
+        """Go on from the numbers of a former life: contacts and tasks until something tells of them.
+
+        If nothing does within the window of the recent statistics, they are over by then.
+        """
+        name, until = former.actor, now + self._config.window
+        one = self._actors[name]
         one.tally.resume(former.session)
-        one.engagement.estimate = EngagementEstimate(former.engagement, former.level, former.reasons)
+        one.engagement.resume(former)
+        one.held_until = until
+        if former.busy and name != TOGETHER:
+            self._held_busy[name] = until
+            self._busy |= {name}
         one.is_new = True
         self._changed.add(name)
+
+    def remember(self, event: ConnectionEvent) -> None:
+        """Take an event of the recent window of a former life, as it last was."""
+        for name in (event.person(self._robot), TOGETHER):
+            self._actors[name].tally.remember(event)
 
     def join(self, other: str, kept: str) -> None:
         """Count the events of a person as those of `kept`, too. The estimate goes on from the one that is newer."""
@@ -132,8 +157,12 @@ class PublishedStatistics:
         """Freeze the estimate of who has got busy, and of all, as it is now; or let it go."""
         changed, self._busy = {TOGETHER, *(busy ^ self._busy)}, busy
         for actor in changed:
-            self._actors[actor].engagement.update(now, busy=self._is_busy(actor))
-            self._actors[actor].is_urgent = True
+            one = self._actors[actor]
+            one.is_urgent = True
+            if self._is_busy(actor):
+                one.engagement.update(now, busy=True)
+            else:
+                one.engagement.get_free(now)
         self._changed |= changed
 
     def _is_busy(self, actor: str) -> bool:
@@ -148,7 +177,7 @@ class PublishedStatistics:
             one = self._actors[actor]
             one.look(now)
             if one.is_due(now):
-                told.append(self._statistics(actor, now))
+                told.append(self.statistics(actor, now))
                 one.told_at, one.is_new, one.is_urgent = now, False, False
                 one.leaves = inf if (leaves := one.tally.next_change(now)) is None else leaves
             self._agenda.set(actor, one.next_look(now))
@@ -156,13 +185,23 @@ class PublishedStatistics:
 
     def overall(self, now: Seconds) -> Statistics:
         """Statistics of all together, as they are."""
-        return self._statistics(TOGETHER, now)
+        return self.statistics(TOGETHER, now)
 
-    def _statistics(self, actor: str, now: Seconds) -> Statistics:
+    def statistics(self, actor: str, now: Seconds) -> Statistics:
+        """Statistics of an actor, as they are."""
         one = self._actors[actor]
         busy = self._is_busy(actor)
-        estimate = one.engagement.update(now, busy=busy)
+        engagement = one.engagement
+        estimate = engagement.update(now, busy=busy)
+        contact = Contact(
+            now=engagement.contact.now, share=engagement.contact.share(now), ended=self._stamp(engagement.apart_since)
+        )
         return Statistics(
             actor=actor, at=Stamp(self._clock, now), session=one.tally.session(), recent=one.tally.recent(now),
             engagement=estimate.value, level=estimate.level, reasons=estimate.reasons, busy=busy,
+            busy_until=self._stamp(engagement.busy_until), level_since=self._stamp(engagement.level_since),
+            contact=contact,
         )  # fmt: skip
+
+    def _stamp(self, at: Seconds) -> Stamp | None:
+        return Stamp(self._clock, at) if isfinite(at) else None

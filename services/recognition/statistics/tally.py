@@ -23,6 +23,13 @@ SETTLED: Seconds = 120.0
 """Longest time until a start becomes known: a later one is counted, but splits no gap."""
 
 
+def is_same_start(one: ConnectionEvent, other: ConnectionEvent) -> bool:
+    """True if an event that is not decided is the other one, told by another life under another id."""
+    return one.state == "started" and (one.kind, one.started, one.initiator, one.responder) == (
+        other.kind, other.started, other.initiator, other.responder
+    )  # fmt: skip
+
+
 class Spread(Struct):
     """Number, sum, least and greatest of some delays."""
 
@@ -290,8 +297,12 @@ class EventTally:
         return [event for event in self._recent.values() if event.started.seconds + length > now]
 
     def resume(self, former: WindowStatistics) -> None:
-        """Go on from the counts of a former life; the recent window begins anew."""
+        """Go on from the counts of a former life."""
         self._session.resume(former)
+
+    def remember(self, event: ConnectionEvent) -> None:
+        """Take an event of the recent window that a former life has counted."""
+        self._recent[event.id] = event
 
     def join(self, other: "EventTally") -> None:
         """Add the events of another."""
@@ -302,10 +313,12 @@ class EventTally:
 
     def resume_event(self, event: ConnectionEvent) -> None:
         """Take an event that is not decided. The counts have its start, unless it came after they were last told."""
+        self._recent = {id: each for id, each in self._recent.items() if not is_same_start(each, event)}
         last = self.starts.last
         if last is None or event.started.seconds > last:
             self.feed(event)
         self._open[event.id] = False
+        self._recent[event.id] = event
 
     @property
     def starts(self) -> Starts:
