@@ -243,7 +243,7 @@ class WindowStatistics(Struct, frozen=True, kw_only=True, omit_defaults=True):
 EngagementLevel = Literal["engaged", "engaging", "disengaging", "disengaged", "unknown"]
 
 
-class Contact(Struct, frozen=True, kw_only=True, omit_defaults=True):
+class PersonContact(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Contact of a person with the robot: looks at it, talk with it, shared looks.
 
     now: how much there is of it; None: nobody tells of looks. share: of the last seconds, up to the instant of the
@@ -263,6 +263,7 @@ class Statistics(Struct, frozen=True, kw_only=True, tag="statistics", omit_defau
     engagement: estimate in 0..1; None: too little is known. level: the same in a word. reasons: why, in words.
     busy: the person is busy with a task, so that silence is no sign of less engagement.
     busy_until: when the last task was over. level_since: when the level became what it is; of both None: not known.
+    contact: contact of the person with the robot.
     """
 
     actor: str
@@ -275,4 +276,4 @@ class Statistics(Struct, frozen=True, kw_only=True, tag="statistics", omit_defau
     busy: bool = False
     busy_until: Stamp | None = None
     level_since: Stamp | None = None
-    contact: Contact = Contact()
+    contact: PersonContact = PersonContact()

@@ -78,7 +78,7 @@ def numbers(reasons: tuple[str, ...]) -> list[float]:
     return [float(each) for each in re.findall(r"\d+\.?\d*", " ".join(reasons))]
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 def test_what_is_estimated_goes_on_as_without_the_restart(
     tmp_path: Path, seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -86,7 +86,7 @@ def test_what_is_estimated_goes_on_as_without_the_restart(
     chance = random.Random(seed)
     one, other, restarts = Counted(tmp_path / "one"), Counted(tmp_path / "other"), 0
     happens = news(random.Random(seed), 100.0)
-    for number in range(300):
+    for number in range(150):
         now = 100.0 + number
         changes, busy, contacts = next(happens)
         for life in (one, other):
@@ -103,7 +103,7 @@ def test_what_is_estimated_goes_on_as_without_the_restart(
             assert found.engagement == pytest.approx(expected.engagement)
             assert (found.contact.now, found.contact.ended) == (expected.contact.now, expected.contact.ended)
             assert found.contact.share == pytest.approx(expected.contact.share)
-    assert restarts > 10
+    assert restarts > 5
 
 
 class Life:

@@ -46,7 +46,7 @@ def test_a_loss_that_is_told_twice_is_no_second_one_though_the_person_was_found_
     person.found(1.0)
     person.lost(1.0)
 
-    assert person.deadline is None
+    assert person.deadline == math.inf
 
 
 def test_a_loss_from_before_the_person_was_seen_again_is_none():
@@ -54,7 +54,7 @@ def test_a_loss_from_before_the_person_was_seen_again_is_none():
     person.seen(1.1)
     person.lost(1.0)
 
-    assert person.deadline is None
+    assert person.deadline == math.inf
 
 
 def test_a_loss_while_the_face_is_lost_is_none_later_either():
@@ -65,7 +65,7 @@ def test_a_loss_while_the_face_is_lost_is_none_later_either():
     person.seen(1.3)
     person.lost(1.2)
 
-    assert person.deadline is None
+    assert person.deadline == math.inf
 
 
 @pytest.mark.parametrize(("after", "directs"), [(2.0, False), (2.1, True)])

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Set
 from functools import partial
 from math import inf, isfinite
 
-from engage_hri.schemas.recognition import ConnectionEvent, Contact, Statistics
+from engage_hri.schemas.recognition import ConnectionEvent, PersonContact, Statistics
 from engage_hri.schemas.units import Probability, Seconds, Stamp
 from engage_hri.services.bus.deadlines import Deadlines
 from engage_hri.services.recognition.config import RecognitionConfig
@@ -193,7 +193,7 @@ class PublishedStatistics:
         busy = self._is_busy(actor)
         engagement = one.engagement
         estimate = engagement.update(now, busy=busy)
-        contact = Contact(
+        contact = PersonContact(
             now=engagement.contact.now, share=engagement.contact.share(now), ended=self._stamp(engagement.apart_since)
         )
         return Statistics(
