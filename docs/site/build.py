@@ -35,6 +35,7 @@ CONTENTS = {
     "From other programs": (
         "reference",
         "people",
+        "talk",
         "connection-events",
         "protocol",
         "other-languages",

@@ -22,6 +22,7 @@ from engage_hri.services.runtime.installation import extra_command
 FAMILIES: dict[str, dict[str, str]] = {
     "look": {
         "demo": "Watch a robot and a person make a tangram: everything in this one process.",
+        "talk": "Talk with a robot: voice, ears and a manager of a few rules, in the browser or on devices.",
         "watch": "Follow a running system: connection events, the open ones first, feedback, claims on the head, "
         "as they come.",
         "console": "Show a running robot in the browser: the scene in 3D, lanes of events and behaviors, the "

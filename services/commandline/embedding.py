@@ -88,14 +88,20 @@ async def in_memory(config: RobotConfig, services: Mapping[str, Service]) -> Asy
 
 
 async def play_tangram(
-    config: RobotConfig, sinks: Iterable[Sink], hub: Hub | None = None, record: Path | None = None
+    config: RobotConfig,
+    sinks: Iterable[Sink],
+    hub: Hub | None = None,
+    record: Path | None = None,
+    *,
+    hears: bool = False,
 ) -> None:
     """Run all services until the task is over. sinks: get all messages, with instants of this loop.
 
     hub: the bus on which they run, for others to look on; None: one in memory. record: a file for all that is said.
+    hears: hearing runs as well.
     """
     async with MemoryHub(config.robot, decodes=False) if hub is None else nullcontext(hub) as hub:
-        bound = services(config, *roster.PLAY)
+        bound = services(config, *roster.PLAY, *(roster.SENSES if hears else ()))
         kept = recording(hub.join("record"), record, (keys.EVERYTHING,), {}) if record else nullcontext()
         bus = hub.join("console")
         try:

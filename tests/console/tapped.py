@@ -25,6 +25,7 @@ TAP = """
   window.AudioContext = class extends Plain {
     constructor(options) {
       super(options);
+      if (options?.sinkId) return; // it plays nothing: that of a microphone
       this.early = [];
       window.tapped = { blocks: [], marks: [], rate: this.sampleRate };
       this.audioWorklet.addModule(module).then(() => {

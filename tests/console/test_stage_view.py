@@ -124,3 +124,9 @@ def test_a_visitor_of_the_stage_sits_down_and_does_no_more_whatever_the_role_of_
     assert set(denied) == set(orders.ALL_RIGHTS) - {"seat"}
     assert "seat" in orders.denied("operator", True, stage=True)
     assert set(orders.denied("wizard", False, stage=True)) == set(orders.ALL_RIGHTS)
+
+
+def test_it_hears_while_hearing_is_on_the_bus() -> None:
+    ears = sections.Health("hearing", False, True, True, (), ())
+
+    assert [told().hears, told(health=[ears]).hears] == [False, True]

@@ -11,6 +11,7 @@ NAME = re.compile(r"`([\w/]+\.(?:py|toml))`")
 THEIRS = {
     "FILE.py",
     "engage.toml",
+    "mine.py",
     "mine.toml",
     "calibration.toml",
     "poor.toml",

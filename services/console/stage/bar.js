@@ -1,39 +1,56 @@
 // The bars: above the language, below the one large button, and what a person at the table can do.
 import { element } from "../page/look.js";
+import { microphone } from "../page/microphone.js";
+import { voice } from "../page/voice.js";
 import { put } from "./heads.js";
 
 const icon = (path) => `<svg viewBox="0 0 24 24" width="26" height="26" fill="none" stroke="currentColor" stroke-width="2" stroke-linecap="round" stroke-linejoin="round" aria-hidden="true">${path}</svg>`;
+const STAYS = 12000; // ms for which it is told why the microphone, or the voice, went off
 const ICONS = {
   mic: icon('<rect x="9" y="3" width="6" height="11" rx="3"/><path d="M5 11a7 7 0 0 0 14 0M12 18v3"/>'),
+  loud: icon('<path d="M4 9.5v5h3.5L12 18.5v-13L7.5 9.5zM15.5 9a4 4 0 0 1 0 6M18 6.5a8 8 0 0 1 0 11"/>'),
+  mute: icon('<path d="M4 9.5v5h3.5L12 18.5v-13L7.5 9.5zM16 9.5l5 5m0-5-5 5"/>'),
   send: icon('<path d="M4 12 20 4l-4 16-4-7z"/>'),
   nod: icon('<circle cx="12" cy="12" r="8"/><path d="M12 8v7m-3-3 3 3 3-3"/>'),
   point: icon('<path d="M9 12V5a1.5 1.5 0 0 1 3 0v5l4 1a3 3 0 0 1 2 3l-.5 3a4 4 0 0 1-4 3H12a4 4 0 0 1-3.2-1.6L5.5 14A1.6 1.6 0 0 1 8 12z"/>'),
   leave: icon('<path d="M14 4h4a2 2 0 0 1 2 2v12a2 2 0 0 1-2 2h-4M3 12h11m-4-4 4 4-4 4"/>'),
 };
 
-// order: sends one. turn: takes the other language.
-export function bar({ top, bottom, order, turn }) {
+// order: sends one. turn: takes the other language. session: gives that of the page's link to the window.
+export function bar({ top, bottom, order, turn, session }) {
   let text = null;
   let isSitting = false;
   let isSpeaking = false;
-  const drawing = (name) => {
-    const made = element("span", { class: "icon" });
+  let isMuted = false; // by who looks at this page
+  const sounds = { voice: { state: "off" }, microphone: { state: "off" } }; // as they were shown last, and since when
+  const paint = (made, name) => {
     made.innerHTML = ICONS[name];
     return made;
   };
+  const drawing = (name) => paint(element("span", { class: "icon" }), name);
   const button = (kind, act, ...inside) => {
     const made = element("button", { type: "button", class: kind }, ...inside);
     if (act) made.addEventListener("click", act);
     return made;
   };
+  const shows = (name) => (now) => {
+    const was = sounds[name];
+    sounds[name] = { ...now, since: was.state === now.state && was.news === now.news ? was.since : performance.now() };
+    draw();
+  };
   const other = button("other", turn);
+  const loud = button("loud", () => {
+    isMuted = sounds.voice.state === "on";
+    robot.press();
+  }, drawing("mute"));
   const who = element("p", { class: "who" }, element("i", { class: "ring" }), element("b", {}), element("span", { class: "level" }));
-  top.append(who, other);
+  top.append(who, loud, other);
 
   const hint = element("p", { class: "hint", role: "status" });
   const sit = button("sit", () => {
     if (isSitting || sit.getAttribute("aria-disabled")) return;
     isSitting = true;
+    if (!isMuted && sounds.voice.state === "off") robot.press(); // browsers let a page sound from a press on
     draw();
     order({ do: "sit", name: "" });
   });
@@ -41,21 +58,23 @@ export function bar({ top, bottom, order, turn }) {
   const away = element("div", { class: "away" }, sit);
   top.after(welcome);
 
-  const hold = button("hold", null, drawing("mic"));
+  // Where the robot hears, this is the microphone; else one talks without words while it is held.
+  const hold = button("hold", () => isEar() && ear.press(), drawing("mic"));
+  const isEar = () => Boolean(last?.hears) || sounds.microphone.state !== "off";
   const speak = (on) => {
     if (isSpeaking === on) return;
     isSpeaking = on;
-    hold.setAttribute("aria-pressed", String(on));
     order({ do: "speak", on });
     draw();
   };
   hold.addEventListener("pointerdown", (event) => {
+    if (isEar()) return;
     hold.setPointerCapture(event.pointerId);
     speak(true);
   });
   for (const end of ["pointerup", "pointercancel", "blur"]) hold.addEventListener(end, () => speak(false));
   hold.addEventListener("keydown", (event) => {
-    if (event.key !== " " && event.key !== "Enter") return;
+    if (isEar() || (event.key !== " " && event.key !== "Enter")) return;
     event.preventDefault();
     if (!event.repeat) speak(true);
   });
@@ -86,8 +105,23 @@ export function bar({ top, bottom, order, turn }) {
   bottom.append(hint, away, here);
 
   let last = null;
+  const robot = voice(shows("voice"));
+  const ear = microphone(session, {
+    show: shows("microphone"),
+    level: (value) => hold.style.setProperty("--loud", value.toFixed(2)),
+  });
   function draw() {
-    if (!last || !text) return;
+    if (!text) return;
+    const [isLoud, heard] = [sounds.voice.state === "on", sounds.microphone.state];
+    if (loud.getAttribute("aria-pressed") !== String(isLoud)) paint(loud.firstChild, isLoud ? "loud" : "mute");
+    loud.setAttribute("aria-pressed", String(isLoud));
+    loud.setAttribute("aria-label", text.loud);
+    hold.setAttribute("aria-label", isEar() ? text.microphone[heard] : text.hold);
+    hold.setAttribute("aria-pressed", String(isSpeaking || heard !== "off"));
+    hold.classList.toggle("on", isSpeaking);
+    hold.classList.toggle("light", heard === "on");
+    hold.classList.toggle("asks", heard === "asked");
+    if (!last) return;
     const { person, denied, ready, company } = last;
     const isFree = ready && !denied;
     here.hidden = !person;
@@ -98,7 +132,6 @@ export function bar({ top, bottom, order, turn }) {
     welcome.classList.toggle("company", company.length > 0);
     welcome.firstChild.textContent = text.hello;
     welcome.lastChild.textContent = denied ? text.onlooker : company.length ? `${text.others(company.join(text.and))} ${text.welcome}` : text.welcome;
-    hold.classList.toggle("on", isSpeaking);
   }
   return {
     // language: its texts.
@@ -109,19 +142,20 @@ export function bar({ top, bottom, order, turn }) {
       words.placeholder = text.type;
       words.setAttribute("aria-label", text.type);
       send.setAttribute("aria-label", text.send);
-      hold.setAttribute("aria-label", text.hold);
       quick.forEach((each, index) => (each.textContent = text.quick[index][0]));
       for (const [made, name] of [[nod, "nod"], [point, "point"], [leave, "leave"]]) made.lastChild.textContent = text[name];
       draw();
     },
-    // person: id of who looks; empty: no seat. ready: the robot can be talked with. company: names of others.
+    // person: id of who looks; empty: no seat. ready: the robot can be talked with. company: names of others. hears: the
+    // robot hears people.
     take(state) {
       const was = last?.person;
       last = state;
+      if (isEar()) speak(false);
       if (state.person) isSitting = false;
       if (was && !state.person) {
         isSpeaking = false;
-        hold.setAttribute("aria-pressed", "false");
+        ear.off();
         point.setAttribute("aria-pressed", "false");
       }
       const hadFocus = (state.person ? away : here).contains(document.activeElement);
@@ -150,6 +184,14 @@ export function bar({ top, bottom, order, turn }) {
     },
     get isSpeaking() {
       return isSpeaking;
+    },
+    get isHeard() {
+      return sounds.microphone.state === "on";
+    },
+    // What is wrong with microphone or voice, in words; empty: nothing.
+    get trouble() {
+      const told = Object.values(sounds).find((each) => each.news && (each.state !== "off" || performance.now() - each.since < STAYS));
+      return told ? told.news(text.sound) : "";
     },
   };
 }

@@ -22,7 +22,7 @@ let news = { text: "", until: 0 };
 
 const order = (what) => link.send(what);
 const bar = bars({
-  top: at(".top"), bottom: at(".bar"), order,
+  top: at(".top"), bottom: at(".bar"), order, session: () => link.session,
   turn() {
     spoken = another(spoken);
     if (!isKiosk) localStorage.setItem("engage-language", spoken);
@@ -61,12 +61,15 @@ function speak() {
   tell();
 }
 
+// Who looks at this page talks: by the button, or heard by the microphone.
+const isTalking = () => bar.isSpeaking || Boolean(state.scene?.people.find((each) => each.id === state.person)?.speaks);
+
 function tell() {
   const { talk, scene, person } = state;
   const present = scene?.people.filter((each) => each.at && each.present && each.id !== person) ?? [];
   bar.take({
     person, denied: state.denied, ready: talk?.state === "ready" && !state.link && Boolean(scene?.body), company: present.map(({ id }) => id),
-    measure: talk?.levels.find(({ actor }) => actor === person), speaks: bar.isSpeaking,
+    measure: talk?.levels.find(({ actor }) => actor === person), speaks: isTalking(), hears: talk?.hears,
   });
   document.body.classList.toggle("seated", Boolean(person));
   if (shown && scene) shown.take(scene, person);
@@ -153,15 +156,18 @@ function hint(now) {
   if (state.link) return text[state.link];
   if (!talk || talk.state !== "ready") return text[talk?.state ?? "away"];
   if (now < news.until) return news.text;
+  if (bar.trouble) return bar.trouble;
   if (!person) return "";
-  if (bar.isSpeaking) return text.talks;
+  if (isTalking()) return text.talks;
   if (bar.points) return text.pointing;
   const thing = (id) => state.scene.things.find((each) => each.id === id)?.label ?? id;
   const met = moment(talk, state.scene.robot, person);
   const next = visit(now - idle, { seated: true, kiosk: isKiosk, touched });
-  if (next.do === "tip" && met?.text !== "looking") return text.tips[next.number % text.tips.length];
+  const tips = text.tips(talk.hears, bar.isHeard);
+  if (next.do === "tip" && met?.text !== "looking") return tips[next.number % tips.length];
+  if (met?.text === "looking" && talk.hears && !bar.isHeard) return tips[0];
   if (met) return typeof text[met.text] === "function" ? text[met.text](thing(met.about)) : text[met.text];
-  return text.tips[0];
+  return tips[0];
 }
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
@@ -169,7 +175,7 @@ let last = 0;
 function tick() {
   requestAnimationFrame(tick);
   const now = clock();
-  if (bar.isSpeaking) idle = now;
+  if (isTalking()) idle = now;
   const next = visit(now - idle, { seated: Boolean(state.person), kiosk: isKiosk, touched });
   if (next.do === "anew") {
     touched = false;

@@ -1,4 +1,6 @@
 // All words of the stage in each of its languages. What robot and people say stays as they say it.
+import { SOUND_WORDS } from "../page/sound-words.js";
+
 const ENGLISH = {
   title: "Sit down before the robot and talk with it",
   other: "Deutsch",
@@ -13,6 +15,8 @@ const ENGLISH = {
   others: (names) => `${names} ${names.includes(" and ") ? "are" : "is"} here already.`,
   and: " and ",
   hold: "Hold to talk",
+  microphone: { off: "Microphone: press to talk", asked: "Microphone: ask no more", on: "Microphone is on: switch it off" },
+  loud: "The robot's voice",
   talks: "You are talking…",
   type: "Say something",
   send: "Say it",
@@ -31,7 +35,10 @@ const ENGLISH = {
   mutual: "You look into each other's eyes.",
   meet: "The robot looks at you. Touch its face to look back.",
   listen: "The robot is speaking to you.",
-  tips: ["Touch a piece to look at it.", "Drag a piece to move it.", "Hold the round button, and talk.", "Choose Point, and touch a piece."],
+  tips: (hears, isOn) => [
+    ...(hears ? [isOn ? "Just talk: the robot hears you." : "Press the microphone, and talk."] : []),
+    "Touch a piece to look at it.", "Drag a piece to move it.", ...(hears ? [] : ["Hold the round button, and talk."]), "Choose Point, and touch a piece.",
+  ],
   pointing: "Touch what you point at.",
   moved: "You move it.",
   away: "The robot is getting ready…",
@@ -61,6 +68,8 @@ const GERMAN = {
   others: (names) => `${names} ${names.includes(" und ") ? "sind" : "ist"} schon hier.`,
   and: " und ",
   hold: "Halten und sprechen",
+  microphone: { off: "Mikrofon: drücken und sprechen", asked: "Mikrofon: nicht mehr fragen", on: "Mikrofon ist an: ausschalten" },
+  loud: "Die Stimme des Roboters",
   talks: "Du sprichst…",
   type: "Sag etwas",
   send: "Sagen",
@@ -79,7 +88,10 @@ const GERMAN = {
   mutual: "Ihr schaut euch in die Augen.",
   meet: "Der Roboter schaut dich an. Berühre sein Gesicht, um zurückzuschauen.",
   listen: "Der Roboter spricht mit dir.",
-  tips: ["Berühre ein Teil, um es anzusehen.", "Zieh ein Teil, um es zu bewegen.", "Halte den runden Knopf, und sprich.", "Wähle Zeigen, und berühre ein Teil."],
+  tips: (hears, isOn) => [
+    ...(hears ? [isOn ? "Sprich einfach: der Roboter hört dich." : "Drück auf das Mikrofon, und sprich."] : []),
+    "Berühre ein Teil, um es anzusehen.", "Zieh ein Teil, um es zu bewegen.", ...(hears ? [] : ["Halte den runden Knopf, und sprich."]), "Wähle Zeigen, und berühre ein Teil.",
+  ],
   pointing: "Berühre, worauf du zeigst.",
   moved: "Du bewegst es.",
   away: "Der Roboter macht sich bereit…",
@@ -101,5 +113,5 @@ const ALL = { en: ENGLISH, de: GERMAN };
 export function language(wanted) {
   return wanted.map((each) => each.slice(0, 2).toLowerCase()).find((each) => each in ALL) ?? "en";
 }
-export const texts = (name) => ALL[name];
+export const texts = (name) => ({ ...ALL[name], sound: SOUND_WORDS[name] });
 export const another = (name) => (name === "de" ? "en" : "de");

@@ -16,6 +16,8 @@ from engage_hri.services.console.web import sections
 from engage_hri.services.console.web.picture import MEASURES, Picture
 from engage_hri.services.console.web.seats import SIMULATION, TASK
 
+HEARING = "hearing"
+"""Service that hears people."""
 BUBBLES = 6
 """Turns that are told at most, the newest."""
 Readiness = Literal["ready", "held", "away"]
@@ -59,7 +61,7 @@ class LevelShown(Struct, frozen=True):
 class StageTalk(Struct, frozen=True):
     """All of the stage but what has a place in space. played: people that a program plays.
 
-    task: the robot does its task with whoever comes first.
+    task: the robot does its task with whoever comes first. hears: it hears people.
     """
 
     state: Readiness
@@ -69,6 +71,7 @@ class StageTalk(Struct, frozen=True):
     levels: tuple[LevelShown, ...]
     played: tuple[str, ...]
     task: bool
+    hears: bool
 
 
 def talk(
@@ -100,6 +103,7 @@ def talk(
         ),
         played=tuple(person for person, reporter in reporters.items() if reporter == SIMULATION),
         task=here.get(TASK, False),
+        hears=here.get(HEARING, False),
     )  # fmt: skip
 
 

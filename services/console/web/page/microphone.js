@@ -1,66 +1,54 @@
 // The microphone of the one who sits at this page: on at a press, with a light, and off at the next. Never unasked.
-import { element } from "./look.js";
 import { timed } from "./timed.js";
 
 const RATE = 16000;
 const HEADER = 12; // bytes: the instant, and the number of the frame
-const FULL = RATE * 2; // bytes that may wait for the link: a second of sound; what comes then is lost
+const FULL = 3 * RATE * 2; // bytes that may wait for the link: 3 s of sound, as while the page draws; what comes then is lost
 const SILENT = 1500; // ms without any sound from the microphone, or any word from the window, after which something is wrong
+const LATELY = 5000; // ms for which it is told that sound was lost
 const LOOK = 250; // ms between two looks at how it goes
 const LAG = 8; // windows of sound, a quarter of a second, of which the one that came quickest says how the clocks of context and page stand
 
-const GONE = "The microphone is off: it was unplugged, or taken away.";
-const REFUSED = {
-  NotAllowedError: "your browser, or you, did not let this page have it: its settings for this page say so, beside the address",
-  NotFoundError: "this computer has none, or none is plugged in",
-  NotReadableError: "another program has it, or the system does not give it",
-  OverconstrainedError: "none of this computer gives such sound",
-};
+const GONE = (words) => words.off(words.gone);
 
-// Why no page at this address can have a microphone; empty: it can.
+// Why no page at this address can have a microphone, in words; null: it can.
 function lacking() {
-  if (navigator.mediaDevices?.getUserMedia && window.AudioWorkletNode) return "";
-  if (isSecureContext) return "this browser gives no page a microphone";
-  return "browsers give one only to https and to localhost, and this page came by http: start the window with --https FILE, and open the address that it prints";
+  if (navigator.mediaDevices?.getUserMedia && window.AudioWorkletNode) return null;
+  return (words) => words.none(isSecureContext ? words.unable : words.plain);
 }
 
-export function microphone(panel, session) {
-  const button = element("button", { type: "button", "aria-pressed": "false", id: "microphone" });
-  const level = element("meter", { min: 0, max: 1, "aria-label": "how loud the microphone is", hidden: true });
-  const why = element("span", { class: "why", role: "status" });
-  const place = panel.querySelector(".microphone");
-  place.replaceChildren(button, level, why);
-  place.hidden = true;
+// session: gives that of the page's link to the window. face.show: gets the state (off, asked, on), and news: what is to be
+// told, made of words in a language, or null. face.level: gets how loud it is, 0 to 1, while it is on.
+export function microphone(session, face) {
   let on = null; // what is open while it is on, or asked for
+  let news = null;
 
-  const tell = (text) => why.textContent !== text && (why.textContent = text);
-  function show() {
-    const state = on === null ? "off" : on.ear ? "on" : "asked";
-    button.setAttribute("aria-pressed", String(state !== "off"));
-    button.classList.toggle("light", state === "on");
-    button.textContent = { off: "Microphone", asked: "Microphone: ask no more", on: "Microphone is on: switch it off" }[state];
-    level.hidden = state !== "on";
+  const show = () => face.show({ state: on === null ? "off" : on.ear ? "on" : "asked", news });
+  function tell(what) {
+    news = what;
+    show();
   }
-  function off(text = "") {
+  function off(what = null) {
+    if (on === null && what === null) return;
     const { stream, context, link, timer } = on ?? {};
     on = null;
     clearInterval(timer);
     stream?.getTracks().forEach((track) => track.stop());
     context?.close();
     link?.close();
-    tell(text);
-    show();
+    face.level(0);
+    tell(what);
   }
+  const failed = (reason) => off((words) => words.off(reason(words)));
 
   async function begin() {
-    const own = (on = { number: 0, lost: 0, lags: [], heard: performance.now() });
-    show();
-    tell("Your browser asks you whether this page may have it.");
+    const own = (on = { number: 0, lost: 0, lostAt: -Infinity, lags: [], heard: performance.now() });
+    tell((words) => words.asks);
     let stream;
     try {
       stream = await navigator.mediaDevices.getUserMedia({ audio: { channelCount: 1, echoCancellation: true } });
     } catch (error) {
-      if (on === own) off(`The microphone is off: ${REFUSED[error.name] ?? error.message}.`);
+      if (on === own) failed((words) => words[error.name] ?? error.message);
       return;
     }
     if (on !== own) return stream.getTracks().forEach((track) => track.stop());
@@ -70,17 +58,17 @@ export function microphone(panel, session) {
     try {
       await listen(own, track);
     } catch (error) {
-      if (on === own) off(`The microphone is off: ${error.message}.`);
+      if (on === own) failed(() => error.message);
     }
   }
 
   async function listen(own, track) {
-    tell("");
+    tell(null);
     own.heard = performance.now();
     own.timer = setInterval(() => look(own, track), LOOK);
     const address = new URL(`microphone?session=${encodeURIComponent(session())}`, document.baseURI);
     own.link = timed(address, {
-      ended: (reason) => on === own && off(`The microphone is off: ${reason || "the link to the window is broken"}.`),
+      ended: (reason) => on === own && failed((words) => reason || words.broken),
     });
     own.context = context(own.stream);
     await own.context.audioWorklet.addModule(new URL("page/ear.js", document.baseURI));
@@ -111,11 +99,12 @@ export function microphone(panel, session) {
     if (lags.length > LAG) lags.shift();
     const latency = 1000 * (track.getSettings().latency ?? 0);
     const at = own.link.there((1000 * frame) / own.context.sampleRate + Math.min(...lags) - latency);
-    level.value = samples.reduce((most, each) => Math.max(most, Math.abs(each)), 0) / 32768;
+    face.level(samples.reduce((most, each) => Math.max(most, Math.abs(each)), 0) / 32768);
     if (at === null) return; // the link is being made: nobody waits for what is said before the light
     own.number += 1;
     if (own.link.socket.readyState !== WebSocket.OPEN || own.link.socket.bufferedAmount > FULL) {
       own.lost += samples.length / RATE;
+      own.lostAt = here;
       return;
     }
     const message = new ArrayBuffer(HEADER + samples.byteLength);
@@ -127,30 +116,26 @@ export function microphone(panel, session) {
   }
 
   function look(own, track) {
+    const here = performance.now();
     if (track.readyState === "ended") off(GONE);
-    else if (performance.now() - own.heard > SILENT) tell("The microphone gives no sound: is it muted, or held by another program?");
-    else if (performance.now() - own.link.answered() > SILENT) tell("The window does not answer: nobody knows whether you are heard.");
-    else if (own.link.unheard()) tell(`Nobody hears you: ${own.link.unheard()}.`);
-    else if (own.lost) tell(`Your link is slow: ${own.lost.toFixed(1)} s of your voice were lost.`);
-    else if (track.muted) tell("The system has muted the microphone.");
-    else tell("");
+    else if (here - own.heard > SILENT) tell((words) => words.silent);
+    else if (here - own.link.answered() > SILENT) tell((words) => words.unanswered);
+    else if (own.link.unheard()) tell((words) => words.unheard(own.link.unheard()));
+    else if (here - own.lostAt < LATELY) tell((words) => words.slow(own.lost.toFixed(1)));
+    else tell(track.muted ? (words) => words.muted : null);
   }
 
   document.addEventListener("visibilitychange", () => {
-    if (document.hidden && on) off("The microphone went off as this page was hidden: press to go on.");
-  });
-  button.addEventListener("click", () => {
-    if (on) return off();
-    const reason = lacking();
-    if (reason) return tell(`There is no microphone: ${reason}.`);
-    begin();
+    if (document.hidden && on) off((words) => words.hidden);
   });
   show();
   return {
-    take(state, changed) {
-      if (!changed.has("you")) return;
-      place.hidden = !state.you.person;
-      if (!state.you.person && on) off();
+    off: () => off(),
+    press() {
+      const reason = lacking();
+      if (on) off();
+      else if (reason) tell(reason);
+      else begin();
     },
   };
 }

@@ -1,4 +1,5 @@
 // The page: where its panels stand, and its colours. What the panels show is drawn by the other modules, from frames.
+import { desk } from "./desk.js";
 import { begin } from "./main.js";
 
 const what = (text) => `<p class="what">${text}</p>`; // what a panel shows, for whoever sees it for the first time
@@ -35,7 +36,10 @@ document.body.innerHTML = `<div class="window">
     <p class="waits" role="status" hidden></p>
     <p class="switched" role="status" hidden></p>
     <div id="player" class="player row" role="group" aria-label="The recording" hidden></div>
+    <details class="desk"><summary>Panels</summary></details>
+    <div class="column wide"></div>
     <div class="column main">${panels(MAIN)}</div>
     <div class="column side">${panels(SIDE)}</div>
   </div>`;
+desk(document.querySelector(".window"));
 begin(document.querySelector(".window"), document.body.dataset.robot);

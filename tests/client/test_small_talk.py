@@ -1,0 +1,120 @@
+"""The manager of a few rules: whom it greets, what it answers, and what becomes of who says nothing or goes."""
+
+import asyncio
+import re
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from engage_hri import embedded, perceive
+from engage_hri.services.commandline.embedding import EmbeddedRobot
+from engage_hri.services.commandline.look.small_talk import OTHERWISE, PHRASES, RULES, SILENCE, answer, talk
+from engage_hri.services.commandline.look.talk import RULES as RULES_FILE
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "talk.md").read_text(encoding="utf-8")
+
+
+class Talk:
+    """A talk that goes on. turns: what the robot has said, each turn as one line."""
+
+    def __init__(self, robot: EmbeddedRobot) -> None:
+        self.robot = robot
+        self.turns: list[str] = []
+
+    async def note(self) -> None:
+        with self.robot.turns() as turns:
+            async for turn in turns:
+                self.turns.append(" ".join(each.text for each in turn.spoken))
+
+
+@asynccontextmanager
+async def talking() -> AsyncIterator[Talk]:
+    async with embedded(human="none") as robot:
+        going = Talk(robot)
+        tasks = [asyncio.create_task(going.note()), asyncio.create_task(talk(robot))]
+        try:
+            yield going
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.wait(tasks)
+
+
+async def test_who_comes_is_greeted_answered_and_told_goodbye() -> None:
+    async with talking() as going, perceive("ann", hub=going.robot.hub) as ann:
+        await ann.look_at(ann.robot)
+        await asyncio.sleep(6)
+        for words in ("Good morning!", "I am fine.", "Where is the blue square?", "Goodbye."):
+            await ann.say(words)
+            await asyncio.sleep(6)
+        await asyncio.sleep(60)
+
+    greeting = SILENCE[0][1]
+    assert going.turns == [
+        greeting.removesuffix(" How are you?"), "How are you?", "Hello!", "How are you?", "I am glad to hear that.",
+        "Here is the blue square", "Goodbye! It was nice to talk with you.",
+    ]  # fmt: skip
+
+
+async def test_who_speaks_first_is_answered_and_not_greeted() -> None:
+    async with talking() as going, perceive("ann", hub=going.robot.hub) as ann:
+        await ann.look_at(ann.robot)
+        await ann.say("How old are you, and who made you, and when, and where was that?")
+        await asyncio.sleep(5)
+
+    assert going.turns == ["I began a few minutes ago."]
+
+
+async def test_who_says_nothing_is_offered_help_and_then_left_in_peace() -> None:
+    async with talking() as going, perceive("ann", hub=going.robot.hub) as ann:
+        await ann.look_at(ann.robot)
+        await asyncio.sleep(200)
+
+    assert [turn for turn in going.turns if turn in [line for _, line in SILENCE]] == [
+        line for _, line in SILENCE[1:]
+    ]
+
+
+async def test_each_of_two_is_answered_and_who_has_gone_is_not() -> None:
+    async with talking() as going, perceive("ann", hub=going.robot.hub) as ann:
+        async with perceive("ben", hub=going.robot.hub) as ben:
+            await asyncio.gather(ann.look_at(ann.robot), ben.look_at(ben.robot))
+            await asyncio.sleep(12)
+            await asyncio.gather(ann.say("Tell me a joke."), ben.say("I like you."))
+            await asyncio.sleep(12)
+        await asyncio.sleep(5)
+
+    assert going.turns[-2:] == [answer("i like you"), answer("tell me a joke")]
+
+
+@pytest.mark.parametrize("phrase", PHRASES)
+def test_each_phrase_has_its_own_answer_also_among_other_words(phrase: str) -> None:
+    [own] = [text for phrases, text in RULES.items() if phrase in phrases]
+    assert answer(f"{phrase.capitalize()}!") == own
+
+
+def test_what_it_does_not_know_it_says() -> None:
+    assert answer("Do you like the sea?") == OTHERWISE
+
+
+async def test_the_manager_that_the_page_shows_asks_and_hears(capsys: pytest.CaptureFixture[str]) -> None:
+    [code] = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(code, names)
+    async with embedded(human="none") as robot, perceive("ann", hub=robot.hub) as ann:
+        await ann.look_at(ann.robot)
+        talking = asyncio.create_task(names["talk"](robot))
+        await asyncio.sleep(4)
+        await ann.say(names["PHRASES"][0])
+        await talking
+
+    assert capsys.readouterr().out == "ann has said: tell me more\n"
+
+
+def test_the_table_that_the_page_shows_is_that_of_the_file() -> None:
+    [table] = re.findall(r"^```text\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    lines = RULES_FILE.read_text(encoding="utf-8").splitlines()
+    assert [line for line in table.splitlines() if line not in lines] == []
