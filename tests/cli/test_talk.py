@@ -1,6 +1,8 @@
 """`engage talk`: the manager that it reads or writes, what it tells of what is missing, and a file that it hears."""
 
+import asyncio
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 
@@ -9,11 +11,25 @@ from engage_hri.services.commandline.look.small_talk import PHRASES
 from engage_hri.services.commandline.shell.roster import complete
 from tests.cli.command import Engage, start
 
+FAILS_TWICE = """
+import asyncio
+done = []
+async def work():
+    done.append(1)
+    if len(done) < 3: 1 / 0
+async def talk(robot):
+    async with asyncio.TaskGroup() as group:
+        group.create_task(work())
+"""
 
-def test_a_manager_is_written_where_there_is_none_and_read_as_it_is_then(tmp_path: Path) -> None:
+
+def test_a_manager_is_written_where_there_is_none_and_read_as_it_is_then(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / "mine.py"
 
     written = talk.read_manager(path)
+    assert f"{path} is written" in capsys.readouterr().err
     assert written.phrases == talk.read_manager(None).phrases == PHRASES
 
     path.write_text(path.read_text(encoding="utf-8").replace('("i like you",)', '("you are red",)'), encoding="utf-8")
@@ -26,6 +42,7 @@ def test_a_manager_is_written_where_there_is_none_and_read_as_it_is_then(tmp_pat
         ("async def talk(robot): ...\nsay hello", "line 2"),
         ("import nothing_of_this_name", "No module named 'nothing_of_this_name'"),
         ("def talk(robot): ...", "there is no talk in it"),
+        ('PHRASES = "hello"\nasync def talk(robot): ...', "PHRASES are no phrases"),
     ],
 )
 def test_a_file_that_is_no_manager_is_refused(engage: Engage, tmp_path: Path, text: str, told: str) -> None:
@@ -41,6 +58,22 @@ def test_a_manager_that_cannot_be_written_is_told(engage: Engage, tmp_path: Path
     result = engage("talk", "--manager", tmp_path / "nowhere" / "mine.py")
 
     assert (result.code, "cannot be written" in result.err) == (3, True)
+
+
+async def test_a_manager_that_fails_is_told_and_begins_again_until_it_returns(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "mine.py"
+    path.write_text(FAILS_TWICE, encoding="utf-8")
+    manager, began = talk.read_manager(path), asyncio.get_running_loop().time()
+
+    await talk._managed(manager, cast("Any", None))
+
+    one, other, last = capsys.readouterr().err.splitlines()
+    assert one == other
+    assert ("ZeroDivisionError" in one, f"see {path}, line 6" in one) == (True, True)
+    assert "has returned" in last
+    assert asyncio.get_running_loop().time() - began == pytest.approx(2 * talk.AGAIN, abs=0.1)
 
 
 def test_it_says_plainly_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,16 @@ import pytest
 
 from engage_hri import embedded, perceive
 from engage_hri.services.commandline.embedding import EmbeddedRobot
-from engage_hri.services.commandline.look.small_talk import OTHERWISE, PHRASES, RULES, SILENCE, answer, talk
+from engage_hri.services.commandline.look.small_talk import (
+    EXAMPLES,
+    OTHERWISE,
+    PIECES,
+    RULES,
+    SEVERAL,
+    SILENCE,
+    answer,
+    talk,
+)
 from engage_hri.services.commandline.look.talk import RULES as RULES_FILE
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "talk.md").read_text(encoding="utf-8")
@@ -90,7 +99,29 @@ async def test_each_of_two_is_answered_and_who_has_gone_is_not() -> None:
     assert going.turns[-2:] == [answer("i like you"), answer("tell me a joke")]
 
 
-@pytest.mark.parametrize("phrase", PHRASES)
+async def test_who_wants_help_hears_each_time_other_examples_and_may_ask_for_any_piece() -> None:
+    async with talking() as going, perceive("ann", hub=going.robot.hub) as ann:
+        await ann.look_at(ann.robot)
+        await asyncio.sleep(6)
+        for words in ("Yes.", "What can you do?", "Where's the pink triangle?", "The squares.", "No."):
+            await ann.say(words)
+            await asyncio.sleep(12)
+        things = (await going.robot.world()).objects
+
+    one, other, *rest = going.turns[2:]
+    assert one.startswith("Then say, for example: ")
+    told = [{each for each in EXAMPLES if each in line} for line in (one, other)]
+    assert ([len(each) for each in told], told[0] & told[1]) == ([3, 3], set())
+    assert rest[0] == "Here is the pink triangle"
+    assert rest[-1] == "As you like."
+    assert {answer(f"show me the {piece}", things) for piece in PIECES} == {
+        f"Here is [{each.id}]." for each in things
+    }
+    assert answer("Where is the square?", things) == SEVERAL
+    assert [answer(each, things) for each in EXAMPLES if answer(each, things) == OTHERWISE] == []
+
+
+@pytest.mark.parametrize("phrase", [phrase for phrases in RULES for phrase in phrases])
 def test_each_phrase_has_its_own_answer_also_among_other_words(phrase: str) -> None:
     [own] = [text for phrases, text in RULES.items() if phrase in phrases]
     assert answer(f"{phrase.capitalize()}!") == own

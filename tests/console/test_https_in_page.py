@@ -1,4 +1,4 @@
-"""A window by https: its page works as by http, and alone has a microphone where it is not called as this machine."""
+"""A window by https: its page works as by http, and alone has microphone and voice if not called as this machine."""
 
 import importlib.util
 from collections.abc import Iterator
@@ -74,5 +74,25 @@ async def test_by_https_alone_a_page_from_elsewhere_has_a_microphone(place: Plac
     assert address.startswith(f"{scheme}://{ELSEWHERE}:")
     assert "token" not in address
     assert not errors
-    assert ("browsers give one only to https" in said) == (scheme == "http")
+    assert ("browsers allow it only to https" in said) == (scheme == "http")
     assert ("--https FILE" in said) == (scheme == "http")
+
+
+async def test_by_http_from_elsewhere_a_page_says_that_the_voice_needs_https(place: Place) -> None:
+    async with browser.at_port(place.port) as running, running.page() as page:
+        await page.go(place.urls["http"])
+        await page.until("window.engage?.state.you", 60)
+        await press(page, "#voice")
+        await page.until("document.querySelector('.sound .why').textContent", 2)
+        workshop = await page.value("document.querySelector('.sound .why').textContent")
+        await page.go(place.urls["http"].partition("?")[0] + "stage")
+        await page.until("window.stage?.state.talk?.state === 'ready'", 60)
+        await press(page, ".loud")
+        await page.until("document.querySelector('.hint').textContent.includes('https')", 5)
+        stage = await page.value("document.querySelector('.hint').textContent")
+        errors = page.errors
+
+    assert workshop.startswith("The voice is not heard: browsers allow it only to https")
+    assert "--https FILE" in workshop
+    assert stage.endswith("Ask who looks after the robot.")
+    assert not errors

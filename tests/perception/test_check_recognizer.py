@@ -71,5 +71,7 @@ def test_what_is_missing_is_told(engage: Engage, files: Path):
     assert "write what is said in 1.wav into 1.txt" in engage("check-recognizer", "endpoint", files).err
     assert "no recognizer 'nobody'" in engage("check-recognizer", "nobody", files / "0.wav").err
     assert engage("check-recognizer", "whisper", files / "0.wav", "--model", files).code == 2
+    (files / "empty").mkdir()
+    assert "there is no FILE.wav in it" in engage("check-recognizer", "sphinx", files / "empty").err
     (files / "1.txt").write_text(" ?\n")
     assert "no words" in engage("check-recognizer", "sphinx", files).err

@@ -6,9 +6,11 @@ runs that one. It also runs by itself, beside a robot that runs already: `python
 
 import asyncio
 import re
+from collections.abc import Iterable
+from itertools import cycle, islice
 from typing import Literal
 
-from engage_hri import EngageError, Robot, connect
+from engage_hri import EngageError, Entity, Robot, connect
 
 RULES = {
     # what somebody says, in any of these forms, and what the robot answers; a thing in brackets it shows
@@ -18,29 +20,50 @@ RULES = {
     ("how are you", "are you well"): "I am well, thank you.",
     ("what is your name", "who are you"): "I am a robot, and I have no name yet.",
     ("how old are you",): "I began a few minutes ago.",
-    ("what can you do", "please help me"): "I listen, I look, and I point. Ask me where the blue square is.",
+    (
+        "what can you do",
+        "what can i say",
+        "please help me",
+    ): "I listen, I look, and I point. You can say: {examples}.",
+    ("yes", "yes please"): "Then say, for example: {examples}.",
+    ("no", "no thank you"): "As you like.",
     ("can you hear me", "do you hear me"): "I hear you well.",
     ("what is on the table", "what are these"): "These are the pieces of a puzzle. Which one do you like?",
     ("the blue one", "where is the blue square"): "Here is [blue-square].",
     ("the red one", "show me the red square"): "Here is [red-square].",
     ("tell me a joke", "make me laugh"): "What does a robot do at lunch? It has a megabyte.",
     ("i like you",): "That is kind of you. I like to look at you, too.",
-    ("yes please",): "Then ask me something.",
-    ("no thank you",): "As you like.",
-    ("thank you very much",): "You are welcome.",
+    ("thank you", "thank you very much"): "You are welcome.",
     ("goodbye", "i have to go now"): "Goodbye! It was nice to talk with you.",
 }
-OTHERWISE = "I did not understand that. Ask me what I can do."
+EXAMPLES = (
+    "where is the pink triangle", "make me laugh", "how old are you", "show me the red square",
+    "what is on the table", "where is the white piece", "what is your name",
+)  # fmt: skip
+"""What somebody may say. The robot names three of them as {examples}, and the next three next time."""
+NEXT = cycle(EXAMPLES)
+PIECES = (
+    "orange rectangle", "white piece", "blue square", "green square", "purple square", "red square",
+    "pink square", "yellow triangle", "pink triangle", "purple triangle",
+)  # fmt: skip
+"""What lies on the table of the simulated robot: it shows what is asked for, by colour and shape.
+
+The white one is a trapezoid: the dictionary of `sphinx` has no such word."""
+SEVERAL = "There are several of these. Say colour and shape, as in: where is the blue square."
+OTHERWISE = "I did not understand that. Say, for example: where is the blue square."
 SILENCE = (
     # seconds in which somebody has said nothing, and what the robot says then; the first one greets
     (1.0, "Hello! I am glad that you are here. How are you?"),
-    (15.0, "You can ask me what I can do."),
+    (15.0, "You can say: what can you do, or: where is the blue square."),
     (25.0, "Do you need help?"),
     (40.0, "I see that you are busy. Goodbye!"),
 )
 WORDS = 10.0
 """Seconds for which the robot waits for words of somebody whose voice it hears."""
-PHRASES = tuple(phrase for phrases in RULES for phrase in phrases)
+PHRASES = (
+    *(phrase for phrases in RULES for phrase in phrases),
+    *(f"where is the {piece}" for piece in PIECES if piece != "blue square"),
+)
 """What somebody may say: `engage talk` tells it to a recognizer that knows phrases alone."""
 
 
@@ -74,19 +97,30 @@ async def talk_with(robot: Robot, person: str, floor: asyncio.Lock) -> None:
                     await say(robot, person, line, 3)
             speaks = said is not None and said.actor == person and not said.final
             if said is not None and said.actor == person and said.final and said.id != heard_id:
-                heard_id, text = said.id, answer(said.text)
+                heard_id, text = said.id, answer(said.text, (await robot.world()).objects)
                 silence = [] if text.startswith("Goodbye") else list(SILENCE[1:])
                 async with floor:
                     await say(robot, person, text, 2)
 
 
-def answer(words: str) -> str:
-    """Find what the robot says to words. words: as they were understood, or typed."""
+def answer(words: str, things: Iterable[Entity] = ()) -> str:
+    """Find what the robot says to words: by the longest phrase in them, or else by a thing that they name.
+
+    words: as they were understood, or typed. things: on the table.
+    """
     plain = " ".join(re.findall(r"[\w']+", words.lower()))
-    for phrases, text in RULES.items():
-        if any(re.search(rf"\b{phrase}\b", plain) for phrase in phrases):
-            return text
-    return OTHERWISE
+    texts = {phrase: text for phrases, text in RULES.items() for phrase in phrases}
+    found = max((each for each in texts if re.search(rf"\b{each}\b", plain)), key=len, default="")
+    if " " not in found and (text := shown({*plain.split()}, things)):
+        return text
+    return texts.get(found, OTHERWISE)
+
+
+def shown(words: set[str], things: Iterable[Entity]) -> str:
+    """Find what the robot says to words for colour and shape. Empty: no thing has these."""
+    fits = {thing.id: len({thing.color, thing.shape} & words) for thing in things}
+    best = [id for id, fit in fits.items() if fit == max(fits.values()) > 0]
+    return (SEVERAL if len(best) > 1 else f"Here is [{best[0]}].") if best else ""
 
 
 async def say(robot: Robot, person: str, text: str, turn_index: Literal[2, 3]) -> None:
@@ -94,6 +128,9 @@ async def say(robot: Robot, person: str, text: str, turn_index: Literal[2, 3]) -
 
     turn_index: 2: it answers; 3: it comes by itself.
     """
+    if "{examples}" in text:
+        *some, last = islice(NEXT, 3)
+        text = text.format(examples=f"{', '.join(some)}, or: {last}")
     match = re.fullmatch(r"(.*?[.!]?)\s*([^.!?]*\?)?", text)
     told, asked = match.groups() if match else (text, None)
     try:

@@ -14,6 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
+import msgspec
 import typer
 from msgspec import json
 from rich.console import Console
@@ -24,7 +25,7 @@ from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline.embedding import services
 from engage_hri.services.commandline.look.window import can_open, web, windowed
-from engage_hri.services.commandline.shell.failing_output import complain
+from engage_hri.services.commandline.shell.failing_output import LOG, complain
 from engage_hri.services.commandline.shell.options import Embodied, Hearing, Shown, Written
 from engage_hri.services.commandline.shell.outputs import Outputs
 from engage_hri.services.commandline.shell.process import DONE, run_until_signal
@@ -38,6 +39,8 @@ from engage_hri.services.runtime.installation import extra_command
 from engage_hri.services.runtime.service import running
 
 RULES = Path(__file__).with_name("small_talk.py")
+AGAIN: Seconds = 2.0
+"""Time from the failure of a manager until it begins again."""
 LAST_WORDS: Seconds = 2.0
 """Silence after which all is said, when the sound that was heard is over."""
 
@@ -90,6 +93,7 @@ def read_manager(path: Path | None) -> ManagerFile:
     if path is not None and not path.exists():
         try:
             path.write_bytes(RULES.read_bytes())
+            complain(f"{path} is written: change it, and start again")
         except OSError as error:
             raise RunFailed(Fault(reason=f"it cannot be written: {error.strerror}", where=str(path))) from error
     try:
@@ -101,7 +105,12 @@ def read_manager(path: Path | None) -> ManagerFile:
     if not inspect.iscoroutinefunction(names.get("talk")):
         advice = "`async def talk(robot)`: it gets a Robot, and talks until it is cancelled"
         raise InputRefused(Fault(reason="there is no talk in it", where=str(path), advice=advice))
-    return ManagerFile(names["talk"], tuple(names.get("PHRASES", ())))
+    try:
+        phrases = msgspec.convert(names.get("PHRASES", ()), tuple[str, ...])
+    except msgspec.ValidationError as error:
+        advice = 'PHRASES = ("hello robot",), with a comma also after a single one'
+        raise InputRefused(Fault(reason="PHRASES are no phrases", where=str(path), advice=advice)) from error
+    return ManagerFile(names["talk"], phrases)
 
 
 def _has(package: str) -> bool:
@@ -149,7 +158,7 @@ async def _talk(
             ):
                 if config.hearing.recognizer == "sphinx":
                     tell(f"It understands these alone: {', '.join(config.hearing.phrases)}.")
-                talking = asyncio.create_task(manager.talk(robot), name="manager")
+                talking = asyncio.create_task(_managed(manager, robot), name="manager")
                 heard = asyncio.create_task(_over(over, robot), name="sound")
                 try:
                     await asyncio.wait((talking, heard), return_when=asyncio.FIRST_COMPLETED)
@@ -159,6 +168,26 @@ async def _talk(
                     await asyncio.wait((talking, heard))
             if not talking.cancelled():
                 talking.result()
+
+
+async def _managed(manager: ManagerFile, robot: Robot) -> None:
+    """Run a manager until it returns. One that fails begins again, and the robot stays."""
+    while True:
+        try:
+            await manager.talk(robot)
+        except Exception as error:
+            LOG.debug("the manager has failed", exc_info=error)
+            cause = error
+            while isinstance(cause, ExceptionGroup):
+                cause = cause.exceptions[0]
+            place = seen_at(cause)
+            complain(
+                f"the manager has failed: {words_of(cause)}{place and f', {place}'}; it begins again in {AGAIN:g} s"
+            )
+            await asyncio.sleep(AGAIN)
+        else:
+            complain("the manager has returned: the talk is over")
+            return
 
 
 async def _over(over: asyncio.Event, robot: Robot) -> None:

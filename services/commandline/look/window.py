@@ -6,9 +6,9 @@ import secrets
 import sys
 import webbrowser
 from collections.abc import AsyncIterator, Callable, Mapping
-from contextlib import AsyncExitStack, asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from importlib.util import find_spec
-from socket import gethostname
+from socket import AF_INET, AF_INET6, SOCK_DGRAM, gethostname, socket
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 NEEDED = ("starlette", "uvicorn", "nicegui")
 """Packages without which there is no window."""
 LOCAL = ("127.0.0.1", "::1", "localhost")
+ANY = ("0.0.0.0", "::")
 TOKEN = 12
 """Bytes of chance in a token."""
 
@@ -56,8 +57,19 @@ def web() -> ModuleType:
 def names(shown: Shown) -> tuple[str, ...]:
     """Names by which the page may be called."""
     own = gethostname()
-    more = () if shown.host in LOCAL else (shown.host, own, f"{own}.local")
+    more = () if shown.host in LOCAL else (*filter(None, (shown.host, outward(shown.host))), own, f"{own}.local")
     return (*LOCAL, *more, *(shown.called or ()))
+
+
+def outward(host: str) -> str:
+    """Address of this machine as others see it, by its routes. Empty: it has none, or `host` is not any."""
+    if host not in ANY:
+        return ""
+    inet6 = host == "::"
+    with suppress(OSError), socket(AF_INET6 if inet6 else AF_INET, SOCK_DGRAM) as way:
+        way.connect(("2001:db8::1" if inet6 else "192.0.2.1", 9))  # a socket of this kind sends nothing for that
+        return str(way.getsockname()[0])
+    return ""
 
 
 def hosts(shown: Shown) -> "Hosts":
@@ -95,13 +107,20 @@ async def served(
             advice = free if is_taken else "--host takes an address of this machine"
             reason = os.strerror(error.errno) if error.errno else str(error)
             raise RunFailed(Fault(reason=reason, where=f"{shown.host}:{port}", advice=advice)) from error
-        host = "127.0.0.1" if shown.host in ("0.0.0.0", "::") else shown.host
-        home = f"http{'s' if keys else ''}://{f'[{host}]' if ':' in host else host}:{port}/"
+        other = outward(shown.host)
+        home, abroad = (
+            f"http{'s' if keys else ''}://{f'[{host}]' if ':' in host else host}:{port}/"
+            for host in ("127.0.0.1" if shown.host in ANY else shown.host, other)
+        )
         for page, called in pages.items():
             tell(f"{called}{home}{page}")
+            if other:
+                tell(f"{called.removesuffix(': ')} from other machines: {abroad}{page}")
         if shown.host not in LOCAL:
             seen = f"everybody who reaches {shown.host} sees all of this robot, and the people before it"
-            seen += "" if keys else ", unencrypted"
+            seen += (
+                "" if keys else ", unencrypted, and browsers there give neither microphone nor voice: --https FILE"
+            )
             more = f"; who has the token in the address of the workshop takes part as {role}"
             complain(seen if role == "observer" else seen + more)
         if opens:

@@ -122,6 +122,9 @@ def _median(values: Iterator[float | None]) -> float | None:
 
 def _spoken(given: list[Path]) -> Iterator[SpokenFile]:
     """Each file with its words. Raises InputRefused."""
+    for folder in filter(Path.is_dir, given):
+        if not any(folder.glob("*.wav")):
+            raise InputRefused(Fault(reason="there is no FILE.wav in it", where=str(folder)))
     for path in (each for one in given for each in (sorted(one.glob("*.wav")) if one.is_dir() else [one])):
         text = path.with_suffix(".txt")
         try:

@@ -190,8 +190,8 @@ export function bar({ top, bottom, order, turn, session }) {
     },
     // What is wrong with microphone or voice, in words; empty: nothing.
     get trouble() {
-      const told = Object.values(sounds).find((each) => each.news && (each.state !== "off" || performance.now() - each.since < STAYS));
-      return told ? told.news(text.sound) : "";
+      const told = Object.values(sounds).filter((each) => each.news && (each.state !== "off" || performance.now() - each.since < STAYS));
+      return told.map((each) => each.news(text.sound)).find(Boolean) ?? "";
     },
   };
 }

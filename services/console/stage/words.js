@@ -53,6 +53,7 @@ const ENGLISH = {
   ending: (seconds) => `In ${seconds} s it begins anew for the next visitor.`,
   stay: "I am here",
   flat: "This browser shows no 3D. Words and buttons work all the same.",
+  sound: { late: "", plain: "this page came by http, and browsers want https for it. Ask who looks after the robot" },
 };
 const GERMAN = {
   title: "Setz dich vor den Roboter und sprich mit ihm",
@@ -106,6 +107,7 @@ const GERMAN = {
   ending: (seconds) => `In ${seconds} s beginnt es neu für den nächsten Besuch.`,
   stay: "Ich bin da",
   flat: "Dieser Browser zeigt kein 3D. Worte und Knöpfe gehen trotzdem.",
+  sound: { late: "", plain: "diese Seite kam über http, und Browser wollen dafür https. Frag, wer sich um den Roboter kümmert" },
 };
 const ALL = { en: ENGLISH, de: GERMAN };
 
@@ -113,5 +115,6 @@ const ALL = { en: ENGLISH, de: GERMAN };
 export function language(wanted) {
   return wanted.map((each) => each.slice(0, 2).toLowerCase()).find((each) => each in ALL) ?? "en";
 }
-export const texts = (name) => ({ ...ALL[name], sound: SOUND_WORDS[name] });
+// Of the sound a visitor is told in other words what only the robot's host can mend, and nothing of what passes.
+export const texts = (name) => ({ ...ALL[name], sound: { ...SOUND_WORDS[name], ...ALL[name].sound } });
 export const another = (name) => (name === "de" ? "en" : "de");

@@ -3,6 +3,7 @@ const AGAIN = 1000; // ms from a broken link to the next try
 const LOOK = 200; // ms between two looks at how the clocks of page and context stand
 const USUAL = 22050; // samples per second, until a voice has others
 const MISSED = 0.3; // seconds of sound that came too late, from which on that is told
+const LATELY = 5000; // ms for which it is told
 
 // What plays at a rate. worker: what hands it the sound. late: gets seconds that came too late.
 async function speaker(rate, worker, late) {
@@ -25,10 +26,16 @@ async function speaker(rate, worker, late) {
   };
 }
 
+const LATE = (words) => words.late;
+
 // show: gets the state (off, on), and news: what is to be told, made of words in a language, or null.
 export function voice(show) {
   let on = null; // what is open while it is on
-  const tell = (news = null) => show({ state: on ? "on" : "off", news });
+  let news = null;
+  const tell = (what = null) => {
+    news = what;
+    show({ state: on ? "on" : "off", news });
+  };
 
   async function open(own, rate) {
     if (own.rate === rate) return;
@@ -37,7 +44,9 @@ export function voice(show) {
     try {
       const made = await speaker(rate, own.worker, (seconds) => {
         own.missed += seconds;
-        if (own.missed > MISSED) tell((words) => words.late);
+        if (own.missed < MISSED) return;
+        [own.missed, own.lateAt] = [0, performance.now()];
+        tell(LATE);
       });
       if (on === own && own.rate === rate) own.speaker = made;
       else made.context.close();
@@ -45,14 +54,15 @@ export function voice(show) {
       if (on === own) off((words) => words.mute(error.message));
     }
   }
-  function off(news) {
+  function off(what) {
     on?.worker.terminate();
     on?.speaker?.context.close();
     clearInterval(on?.timer);
     on = null;
-    tell(news);
+    tell(what);
   }
   function begin() {
+    if (!isSecureContext) return tell((words) => words.mute(words.plain)); // without an audio worklet
     const own = (on = { missed: 0, worker: new Worker(new URL("page/voice-link.js", document.baseURI), { type: "module" }) });
     tell();
     const connect = () => own.worker.postMessage({ place: new URL("voice", document.baseURI).href });
@@ -69,6 +79,7 @@ export function voice(show) {
     own.timer = setInterval(() => {
       if (["suspended", "interrupted"].includes(own.speaker?.context.state)) own.speaker.context.resume();
       own.speaker?.look();
+      if (news === LATE && performance.now() - own.lateAt > LATELY) tell();
     }, LOOK);
     open(own, USUAL); // at the press: later a browser may not let it sound
     connect();
