@@ -52,6 +52,8 @@ class Conversation:
         """What the person does in the robot's turn, as long as it is not decided what it is."""
         self._brief: tuple[Seconds, Seconds | None] | None = None
         """Beginning and end of the person's last speech within the robot's turn, if it has been no answer so far."""
+        self._echo: SignPart | None = None
+        """The last of what was nothing but the robot's own words in its turn. More words of it may come."""
         self._scene = scene
         self._config = config
         self._writer = writer
@@ -205,7 +207,8 @@ class Conversation:
     @property
     def _sign_deadline(self) -> Seconds:
         sign = self._sign
-        if sign is None or (sign.speeches and self._listens(sign.speeches[-1].since)):
+        last = sign.speeches[-1].since if sign is not None and sign.speeches else None
+        if sign is None or (last is not None and (self._listens(last) or self._is_echo(last))):
             return inf
         if not self._is_worded:
             return sign.deadline(self._config.backchannel_limit)
@@ -244,7 +247,11 @@ class Conversation:
             return
         heard = [(self._listens(speech.since), speech) for speech in sign.speeches]
         interrupts = next((speech for listens, speech in heard if listens is False), None)
-        is_known = not self._is_worded or sign.is_wordless or all(listens for listens, _ in heard)
+        is_known = (
+            not self._is_worded
+            or sign.is_wordless
+            or all(listens or self._is_echo(speech.since) for listens, speech in heard)
+        )
         if interrupts is not None:
             self._answers(interrupts, at)
         elif sign.until is not None and is_known:
@@ -253,6 +260,10 @@ class Conversation:
     def _was_backchannel(self, sign: ListenerSign, until: Seconds) -> None:
         if sign is self._sign:
             self._sign = None
+        for echo in [speech for speech in sign.speeches if self._is_echo(speech.since)]:
+            sign.parts.remove(echo)
+            self._echo = echo
+            self._tell_listening(echo, until)
         if all(part.action == "point" for part in sign.parts):
             return  # a point in the robot's turn directs the gaze, and says nothing
         event = self._backchannel(self._scene.robot, self.id, sign.since, sign.confidence)
@@ -287,6 +298,8 @@ class Conversation:
         Of several parts it is the one that began first. A gesture that answers nothing here stays what it is.
         """
         for part in self._sign.going_on() if self._sign is not None else ():
+            if part.action == "speak" and self._is_echo(part.since):
+                continue
             if part.action == "speak" or self.pair.may_be_answered_with(part.action):
                 self._answers(part, at, reading)
                 return
@@ -297,11 +310,16 @@ class Conversation:
         They may come when its length has already decided: a "stop" was too short for an answer, and "yes, yes, okay"
         too long for a backchannel.
         """
-        if self._sign is not None and any(speech.since == since for speech in self._sign.speeches):
+        in_sign = [] if self._sign is None else [each for each in self._sign.speeches if each.since == since]
+        if in_sign:
+            if self._is_echo(since):
+                self._tell_listening(in_sign[0], at)  # the robot need not wait until it is over
             self._judge(at)
             return
         pair, listens = self.pair, self._listens(since)
-        if listens:
+        if self._echo is not None and self._echo.since == since and says_words(self._writer.text_of(self.id, since)):
+            self._was_no_echo(self._echo, at, listens=listens)
+        elif listens:
             if pair.was_listening(since):
                 part = SignPart("speak", since, self._speech_confidence, self._speeches.get(since))
                 if part.until is None:
@@ -313,6 +331,21 @@ class Conversation:
             self._human_turn(since, "speak", self._speech_confidence)
             if self._brief[1] is not None:
                 pair.ends("speak", self._brief[1], by_robot=False)
+
+    def _was_no_echo(self, part: SignPart, at: Seconds, *, listens: bool | None) -> None:
+        """Take what was nothing but the robot's words for speech: the person's have come."""
+        self._echo, until = None, part.until
+        assert until is not None
+        if listens:
+            self._was_backchannel(ListenerSign([part]), until)
+            return
+        self._writer.interject(self.id, part.since, "interruption" if listens is False else "answer", at)
+        self.has_said(part.since, until, part.confidence)
+
+    def _is_echo(self, since: Seconds) -> bool:
+        """True if nothing but the robot's own words is known of a speech."""
+        is_echo = (self.id, since) in self._scene.echoes
+        return is_echo and not says_words(self._writer.text_of(self.id, since))
 
     def _listens(self, since: Seconds) -> bool | None:
         """True if the words of a speech are a listener's; None: they are unknown, or not said to the robot's turn."""
