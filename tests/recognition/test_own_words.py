@@ -9,7 +9,7 @@ import pytest
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.recognition import Interjection
-from engage_hri.services.recognition.perceive.own_words import OwnWords
+from engage_hri.services.text.own_words import OwnWords
 from tests.recognition.observations import HUMAN, stamp
 from tests.recognition.test_words import Talk
 

@@ -16,7 +16,7 @@ from engage_hri.schemas.units import Probability, Seconds, Stamp
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.limits import ROUNDING
 from engage_hri.services.recognition.events.scene import Worded
-from engage_hri.services.recognition.perceive.own_words import OwnWords
+from engage_hri.services.text.own_words import OwnWords
 
 WORDS_MARGIN: Seconds = 0.5
 """Time by which spoken words may miss the speech that they belong to: recognizers and voice detectors disagree about
