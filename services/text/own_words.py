@@ -18,7 +18,7 @@ WORDS_KEPT = 256
 """Number of words of the robot that are remembered: those of about a minute and a half."""
 EARLY: Seconds = 0.3
 """Time by which a recognizer may take an echo to begin before the robot's word does. Ours."""
-LATE: Seconds = 0.3
+LATE: Seconds = 0.5
 """Time after the end of the first word by which its echo has begun: sound and sensors take their time. Ours."""
 LETTER: Seconds = 0.1
 """Longest time for a letter of a word: before a word that took longer the voice has waited. Ours."""
@@ -56,21 +56,21 @@ class OwnWords:
     def are(self, text: str, began: Seconds, *, is_final: bool) -> bool:
         """Tell whether words that begin at `began` are the robot's own.
 
-        is_final: False: the last of several may be half of a word.
+        is_final: False: the last of several may be half of a word, and more may follow.
         """
         heard = plain_words(text)
         heard = heard if is_final else heard[:-1] or heard
-        words = list(self._words)
+        words, late = list(self._words), 0.0 if is_final else LATE
         return bool(heard) and any(
             each.text == heard[0]
             and each.began - EARLY <= began <= each.ended + LATE
-            and _is_echo(heard, words[place : place + len(heard) + len(heard) // 2], began)
+            and _is_echo(heard, words[place : place + len(heard) + len(heard) // 2], began - late)
             for place, each in enumerate(words)
         )
 
 
 def _is_echo(heard: list[str], said: list[_OwnWord], began: Seconds) -> bool:
-    """Tell whether most of what is heard, and the last of it, is in what was said; began: before the end of that."""
+    """Tell whether most of what is heard, and the last of it, is in what was said. began: before the end of that."""
     same = SequenceMatcher(None, heard, [word.text for word in said], autojunk=False).get_matching_blocks()
     found = {block.a + n: said[block.b + n] for block in same for n in range(block.size)}
     last = found.get(len(heard) - 1)

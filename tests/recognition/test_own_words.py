@@ -156,8 +156,8 @@ def test_what_comes_back_at_its_time_is_the_robots_and_what_comes_later_is_not(s
     first = random_.randrange(len(spoken))
     run = spoken[first : first + random_.randint(1, 8)]
     words = [word for word, _, _ in run]
-    _, began, ended = run[0]
-    lag = random_.uniform(-0.2, 0.25 if len(run) > 1 else min(0.25, ended - began))
+    began = run[0][1]
+    lag = random_.uniform(-0.2, min(0.5, run[-1][2] - began))
     after = run[-1][2] + random_.uniform(0.05, 3.0)
     misheard = [*words]
     for place in random_.sample(range(1, len(words) - 1), len(words) // 3) if len(words) > 3 else ():
