@@ -188,18 +188,21 @@ class Coder:
             ]  # fmt: skip
             interrupts = [each for each in sign if each.action == "speak" and self._interrupts(each, turn)]
             answers = sorted([*goes_on, *interrupts], key=lambda each: each.since)
-            following = sets[number + 1][0].since if number + 1 < len(sets) else turn.until
+            following = sets[number + 1][0].since if number + 1 < len(sets) else (1e9, 0)
             over = max(each.until for each in every if sign[0].since <= each.since <= sign[-1].until)
-            late = [each for each in interrupts if self._is_told_late(each, turn, following)]
+            late = [each for each in sign if self._is_told_late(each, following)]
             is_brief = any(over < each.known for each in late if each.known is not None) and not goes_on
+            parts = [each for each in sign if each not in late and self._shows(each)]
             if any(each.action == "speak" for each in answers) or (answers and not found):
                 found.append(answers[0])
                 is_listening = is_brief
             else:
-                is_decided = bool(found) and any(each.seconds > WORDS_WAIT + ROUND for each in sign)
-                is_listening = any(each.action != "point" for each in sign) and not is_decided
-            if is_listening:
-                self._note("backchannel", ROBOT, side.person, sign[0].since[0], "completed")
+                is_listening = not (found and any(each.seconds > WORDS_WAIT + ROUND for each in sign))
+            if is_listening and parts:
+                self._note("backchannel", ROBOT, side.person, parts[0].since[0], "completed")
+            for each in late:
+                if each.words in LISTENING and each.known is not None and each.known < turn.until:
+                    self._note("backchannel", ROBOT, side.person, each.since[0], "completed")
         return found
 
     def _listens_beside(self, side: Side, turn: Turn) -> None:
@@ -211,17 +214,19 @@ class Coder:
                 and since < each.since < until
             ]  # fmt: skip
             for speech in beside:
-                self._used |= {
-                    id(each) for each in self._timeline.spans
-                    if each.who == side.person and speech.since < each.since < speech.until and each.action != "speak"
-                }  # fmt: skip
-                self._used.add(id(speech))
+                sign = [speech] + [
+                    each for each in self._timeline.spans
+                    if each.who == side.person and speech.since < each.since < speech.until
+                    and each.action not in ("speak", "look")
+                ]  # fmt: skip
+                self._used |= set(map(id, sign))
+                shown = sorted(each.since for each in sign if self._shows(each))
                 is_brief = speech.seconds <= (self._longest_sound if self._timeline.is_worded else BRIEF) + ROUND
                 takes_floor = not is_brief if speech.known is None else speech.words not in LISTENING
                 if speech.until > until or takes_floor:
                     self._turns.add(id(speech))
-                else:
-                    self._note("backchannel", ROBOT, side.person, speech.since[0], "completed")
+                elif shown:
+                    self._note("backchannel", ROBOT, side.person, shown[0][0], "completed")
 
     def _is_listening(self, side: Side, turn: Turn) -> bool:
         """True if the robot says a little while the person speaks, and has nothing to answer."""
@@ -229,11 +234,13 @@ class Coder:
         beside = any(each.to == ROBOT and each.since < turn.since and turn.until < each.until for each in speech)
         return beside and turn.until[0] - turn.since[0] <= BRIEF + ROUND
 
-    def _is_told_late(self, speech: Span, turn: Turn, following: Instant) -> bool:
-        """True if a speech counts as a listener's when its words come, so that it has been told as one.
+    def _shows(self, sign: Span) -> bool:
+        """True for what shows that somebody listens: a nod, or words; any sound only where no words are told."""
+        is_noise = sign.action == "speak" and self._timeline.is_worded and sign.known is None
+        return sign.action != "point" and not is_noise
 
-        following: when the next sign begins.
-        """
+    def _is_told_late(self, speech: Span, following: Instant) -> bool:
+        """True if a sound has been told as noise when its words come. following: when the next sign begins."""
         if speech.known is None or speech.seconds > WORDS_WAIT + ROUND:
             return False
         return following < speech.known or speech.known[0] > speech.since[0] + WORDS_WAIT + ROUND
@@ -270,9 +277,13 @@ class Coder:
     def _interrupts(self, speech: Span, turn: Turn) -> bool:
         """True if a speech that is over within the robot's turn takes the floor."""
         is_open = turn.kind == "asks" or speech.seconds <= WORDS_WAIT + ROUND
-        if speech.known is not None and speech.known < turn.until and is_open:
+        if speech.known is not None and is_open and (self._is_heard(speech) or speech.known < turn.until):
             return speech.words not in LISTENING
         return speech.seconds > (WORDS_WAIT if self._timeline.is_worded else BRIEF) + ROUND
+
+    def _is_heard(self, speech: Span) -> bool:
+        """True if the words of a speech are known while they are waited for."""
+        return speech.known is not None and speech.known[0] <= speech.since[0] + WORDS_WAIT + ROUND
 
     # -- the person -----------------------------------------------------------------------------------------------
 
@@ -294,6 +305,8 @@ class Coder:
     def _takes_turn(self, side: Side, sign: Span) -> None:
         """Read an answer, or words of the person's own."""
         at = sign.since[0]
+        if side.unanswered is not None and self._has_spoken(side.unanswered, sign):
+            side.unanswered = None
         if side.asked is not None:
             self._pair_of(side.asked, "succeeded", delay=at - side.asked.until[0])
             side.asked, side.answers_until, side.third_until = None, sign.until, -1.0
@@ -311,6 +324,13 @@ class Coder:
                 side.third_until = -1.0
             else:
                 side.own.append(sign)
+
+    def _has_spoken(self, asked: Turn, sign: Span) -> bool:
+        """True if the robot has begun to say anything, to anybody, after nobody had answered this turn in time."""
+        failed = asked.until[0] + self._limit
+        return any(
+            failed <= since[0] and since < sign.since for turn in self._timeline.turns for since, _ in turn.speech
+        )
 
     def _asked_of_another(self, side: Side, sign: Span) -> Side | None:
         """Whom the robot has asked, and who has not answered yet when somebody else says this."""

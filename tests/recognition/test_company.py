@@ -50,8 +50,8 @@ an answer to another is none
     1 robot asks ann 2; 2 ann looks bob; 3.6 ann speaks 1; 20 end
     robot: started 1, failed 7
 
-who looks at the robot while it waits has answered at once
-    1 robot asks ann 2; 2 ann looks robot; 3.6 ann speaks 9; 4 known
+whom an answer is for is known after three seconds
+    1 robot asks ann 2; 2 ann looks robot; 3.6 ann speaks 9; 6.7 known
     robot: started 1, succeeded 3.6 after 0.6
 
 ... once: the next goes where her own words went
@@ -174,15 +174,24 @@ where nobody tells words a sound is speech
     1 robot asks ann 2; 2 ann looks robot; 3.5 ann speaks 0.8; 20 end
     robot: started 1, succeeded 3.5 after 0.5, completed 4.3
 
+talk to a neighbor is no answer, although the head turns only with the voice
+    1 robot asks ann,bob 2; 2 ann looks robot; 2 bob looks robot; 4 ann speaks 2; 4.1 ann looks bob; 30 end
+    robot: started 1, failed 7
+    robot: started 1, failed 7
+
+a late answer has to come before the robot speaks to anybody
+    1 robot asks ann 1; 2 ann looks robot; 9 robot asks bob 1; 14 ann speaks 1; 30 end
+    robot: started 1, failed 6
+    robot: started 9, preempted 14 after 4 by ann
+
 who stands by and says "uh-huh" to the robot listens
     0 ann said 0; 1 robot asks ann 4; 1 bob looks robot; 2 bob speaks 0.4; 2.6 bob said 2 words=uh-huh; 20 end
     robot: started 1, failed 9
     robot bc: started 2.4, succeeded 2.4, completed 2.4
 
-... or laughs
+... who laughs gives no sign of it
     0 ann said 0; 1 robot asks ann 4; 1 bob looks robot; 2 bob speaks 0.4; 20 end
     robot: started 1, failed 9
-    robot bc: started 2.4, succeeded 2.4, completed 2.4
 
 ... and who says something else has a turn
     0 ann said 0; 1 robot asks ann 4; 1 bob looks robot; 2 bob speaks 0.4; 2.6 bob said 2 words=wait; 20 end
@@ -193,6 +202,37 @@ who stands by and says "uh-huh" to the robot listens
     0 ann said 0; 1 robot asks ann 4; 1 bob looks robot; 4.8 bob speaks 0.4; 5.6 bob said 4.8 words=uh-huh; 20 end
     robot: started 1, failed 9
     bob: started 4.8, started 5.6, failed 9.2
+
+words that come late after a second speech are those of the first
+    0 ann said 0; 1 robot asks ann 2; 3.5 ann speaks 0.3; 5.4 ann speaks 1; 6 ann said 3.5; 6.5 ann said 5.4; 30 end
+    robot: started 1, succeeded 3.5 after 0.5, completed 3.8
+    ann: started 5.4, failed 10.4
+
+... but say nothing if that has been heard before
+    0 ann said 0; 2 ann looks robot; 3.5 ann speaks 0.3; 5.5 ann speaks 1; 6.6 ann said 5.5; 7 ann said 3.5; 30 end
+    ann: started 5.5, failed 10.5
+
+... or the robot has had its answer
+    0 ann said 0; 3 ann speaks 0.3; 5 robot asks ann 1; 7 ann speaks 1; 8 ann said 7; 9 ann said 3; 30 end
+    robot: started 5, succeeded 7 after 1, completed 8
+
+words that end just before the robot's, and are known after these, answer
+    0 ann said 0; 1 robot asks ann 3; 2 ann looks robot; 3.2 ann speaks 0.6; 4.2 ann said 3.2 words=the,blue; 30 end
+    robot: started 1, succeeded 4 after -0.8, completed 4
+
+... or are a listener's
+    0 ann said 0; 1 robot asks ann 3; 2 ann looks robot; 3.2 ann speaks 0.6; 4.2 ann said 3.2 words=uh-huh; 30 end
+    robot: started 1, failed 8
+    robot bc: started 3.8, succeeded 3.8, completed 3.8
+
+... and a turn of who stands by
+    0 ann said 0; 1 robot asks ann 3; 1 bob looks robot; 3.2 bob speaks 0.6; 4.2 bob said 3.2 words=the,blue; 30 end
+    robot: started 1, failed 8
+    bob: started 3.2, failed 7.8
+
+a nod waits until it is known whether somebody has answered before
+    1 robot asks ann 2; 2 ann looks robot; 2 bob looks robot; 4 bob speaks 2; 5 ann nods 0.4; 30 end
+    robot: started 1, preempted 4 after 1 by bob
 
 somebody's early words answer for both who were asked, also if one of them speaks meanwhile
     1 robot asks ann,bob 2; 2 ann looks robot; 2 cy looks robot; 4 cy speaks 0.6; 4.5 ann speaks 0.6; 20 end

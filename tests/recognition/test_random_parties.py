@@ -79,7 +79,7 @@ class Party:
     def robot_says(self, to: str, at: float, lasts: float) -> float:
         """Have the robot take a turn to one person; returns its end."""
         log, end, block = self.log, at + lasts, f"block-{len(self.steps)}"
-        self._unanswered.discard(to)
+        self._unanswered.clear()
         asked = request_event("adjacency_pair", at, request=block, block=block, turn=block, responder=to)
         signal = TurnSignal(id="e", turn=block, signal="ended", actor=to)
         ended = SignalTurn(id=f"{block}/e", requester="realizer", signal=signal, at=stamp(end), block=block)

@@ -121,7 +121,9 @@ class Judge:
         return self.level if value is None or self._busy else self._level(value, now)
 
     def _level(self, value: float, now: Seconds) -> EngagementLevel:
-        return next_level(self.level, value, CONFIG, lasts=now >= self._engaging_since + ENGAGES_AFTER)
+        return next_level(
+            self.level, value, CONFIG, in_contact=True, lasts=now >= self._engaging_since + ENGAGES_AFTER
+        )
 
 
 @settings(max_examples=share_of(25), deadline=None)

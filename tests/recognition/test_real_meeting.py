@@ -100,4 +100,4 @@ def test_no_pair_with_the_robot_is_made_of_what_is_said_to_others(seed: int, *, 
             assert to[each.answered_by or each.responder, round(answered, 3)] == ROBOT, each
 
     assert own >= 4
-    assert answers >= 4
+    assert answers >= 3

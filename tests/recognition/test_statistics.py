@@ -156,7 +156,7 @@ def test_pace_compares_with_the_larger_of_recent_and_open(usual, recent, open, e
     ],
 )  # fmt: skip
 def test_levels_change_only_beyond_the_margin(before, value, after):
-    assert next_level(before, value, RecognitionConfig(), lasts=True) == after
+    assert next_level(before, value, RecognitionConfig(), in_contact=True, lasts=True) == after
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,7 @@ def test_levels_change_only_beyond_the_margin(before, value, after):
     ],
 )  # fmt: skip
 def test_nobody_is_engaged_who_was_not_engaging_for_a_while(before, lasts, after):
-    assert next_level(before, 1.0, RecognitionConfig(), lasts=lasts) == after
+    assert next_level(before, 1.0, RecognitionConfig(), in_contact=True, lasts=lasts) == after
 
 
 def engagement(starts: list[float], failed: int = 0) -> Engagement:
@@ -176,6 +176,13 @@ def engagement(starts: list[float], failed: int = 0) -> Engagement:
         tally.feed(event(f"dg-{number}", "started", start))
         tally.feed(event(f"dg-{number}", "failed" if number < failed else "succeeded", start, 0.5))
     return Engagement(RecognitionConfig(), tally, "robot")
+
+
+def test_nobody_comes_back_by_what_the_robot_does():
+    config = RecognitionConfig()
+
+    for before in ("disengaging", "disengaged"):
+        assert next_level(before, 1.0, config, in_contact=False, lasts=True) == before
 
 
 def test_nothing_seen_is_unknown():

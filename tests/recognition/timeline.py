@@ -244,11 +244,6 @@ class Drawing:
             until = (last[0], last[1] + 1)
             if kind == "asks" and chance.random() < 0.3:
                 until = max(until, self._at(last[0] + self._between(0.0, 0.5)))
-            if len(self.timeline.people) > 1:  # words that come after the turn: it depends on what else is known then
-                for one in spoken:
-                    ends = [until] if one.who == to else [end for _, end in speech]
-                    if one.known is not None and any(one.until <= end <= one.known for end in ends):
-                        one.known = one.until[0], one.until[1] + 1
             if not self._is_away(to, at - 2.5, until[0] + 0.1):
                 turn = Turn(f"turn{len(self.timeline.turns)}", kind, to, speech, until)
                 turn.is_aborted = kind == "asks" and chance.random() < 0.15

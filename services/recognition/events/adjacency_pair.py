@@ -83,6 +83,7 @@ class AdjacencyPair(Machine):
         self._third_turn_until: Seconds = 0.0
         self._unanswered: OngoingEvent | None = None
         """The robot's last pair, if its limit passed without an answer and nobody has begun a turn since."""
+        self._forgotten_at: Seconds = NEVER
 
     @property
     def robot_holds_turn(self) -> bool:
@@ -93,6 +94,11 @@ class AdjacencyPair(Machine):
     def is_interrupted(self) -> bool:
         """True if the first turn, which goes on, has been answered."""
         return self.state == INTERRUPTED
+
+    @property
+    def interrupted_since(self) -> Seconds | None:
+        """Start of the answer to the robot's first turn, which goes on; None: there is none."""
+        return self._response_since if self.state == INTERRUPTED and self._by_robot else None
 
     @property
     def deadline(self) -> Seconds:
@@ -111,7 +117,7 @@ class AdjacencyPair(Machine):
         elif self._turn_end is None:
             self.step("withdraw", at)
         else:
-            self._unanswered = self.event if self._by_robot else None
+            self._unanswered = self.event if self._by_robot and self._forgotten_at < at else None
             self.step("limit", at)
 
     # -- first turn ---------------------------------------------------------------------------------------------
@@ -279,9 +285,12 @@ class AdjacencyPair(Machine):
         self._writer.publish(event, "failed", at, retold=True)
         return True
 
-    def forget_unanswered(self) -> None:
-        """Begin another turn: from now on nothing answers the robot's turn before, however late."""
-        self._unanswered = None
+    def forget_unanswered(self, at: Seconds = NEVER) -> None:
+        """Begin another turn: from now on nothing answers the robot's turn before, however late.
+
+        at: when the robot says something to somebody else. That what failed before has failed may be known later.
+        """
+        self._unanswered, self._forgotten_at = None, max(at, self._forgotten_at)
 
     def _is_earlier_answer(self, action: Action, at: Seconds) -> bool:
         """True if the action, known only now, began before the one that has been taken for the answer so far."""

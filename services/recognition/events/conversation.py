@@ -17,6 +17,7 @@ from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.limits import in_time
 from engage_hri.services.recognition.events.listener_sign import WORDS_WAIT, ListenerSign, SignPart
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent, SpeechStart
+from engage_hri.services.recognition.events.presence import NEVER
 from engage_hri.services.recognition.events.scene import SessionScene
 from engage_hri.services.text.listening import is_listening, says_words
 
@@ -46,12 +47,15 @@ class Conversation:
         self.robot_speaks_since = scene.robot_speaks_to(id)
         """Time when the robot began what it says to this person now; None: it says nothing to them."""
         self._speech_confidence: Probability = 1.0
+        self._turned_at: Seconds = NEVER
+        """Time when the person, or the robot to the person, has last begun to say something."""
         self._speeches: Latest[Seconds, Seconds | None] = Latest(SPEECHES_KEPT)
         """Ends of the person's latest speeches, by their starts; None: it goes on."""
         self._sign: ListenerSign | None = None
         """What the person does in the robot's turn, as long as it is not decided what it is."""
-        self._brief: tuple[Seconds, Seconds | None] | None = None
-        """Beginning and end of the person's last speech within the robot's turn, if it has been no answer so far."""
+        self._brief: Latest[Seconds, tuple[Seconds | None, bool]] = Latest(SPEECHES_KEPT)
+        """Speeches of the person within the robot's turn that have been no answer so far, by their starts: the end,
+        and whether they were noise."""
         self._echo: SignPart | None = None
         """The last of what was nothing but the robot's own words in its turn. More words of it may come."""
         self._scene = scene
@@ -127,6 +131,13 @@ class Conversation:
         return self.speaks_since is not None
 
     @property
+    def takes_floor_since(self) -> Seconds:
+        """Start of what the person says now, or has answered into the robot's turn; infinite: of nothing."""
+        if (answered := self.pair.interrupted_since) is not None:
+            return answered
+        return inf if self.speaks_since is None else self.speaks_since
+
+    @property
     def is_under_way(self) -> bool:
         """True if one holds the floor, or a pair, a sign or a backchannel is open."""
         is_open = self.pair.event is not None or self.robot_backchannel.event is not None or self._cut_into
@@ -146,10 +157,13 @@ class Conversation:
                 self._signs("speak", at, confidence, beside=not self.robot_holds_floor)
                 return
             self._writer.interject(self.id, at, "interruption", at)
-        elif self._is_before_question(at):
-            return
-        self._human_turn(at, "speak", confidence)
-        self._robot_has_answered(at)
+        else:
+            self._writer.decide_interjection(self.id, at, "answer", at)
+            self._next_sign_begins()
+        if not self._is_before_question(at):
+            self._human_turn(at, "speak", confidence)
+            self._robot_has_answered(at)
+        self._turned_at = at
 
     def _is_before_question(self, at: Seconds) -> bool:
         """True if what the person has said at `at` is known only now, and the robot has begun another pair since."""
@@ -161,13 +175,10 @@ class Conversation:
             self.pair.robot_begins("speak", self.robot_speaks_since)
 
     def has_said(self, since: Seconds, until: Seconds, confidence: Probability) -> None:
-        """Take speech that is over, known only now. It answers nothing that the robot has asked since."""
-        if self._is_before_question(since):
-            return
-        if self.speaks_since is None:
+        """Take speech that is over, known only now. It says nothing any more if either has spoken since."""
+        if self._turned_at < since and self.speaks_since is None:
             self.silent_since = until
-        self._human_turn(since, "speak", confidence)
-        self._robot_has_answered(since)
+            self._human_turn(since, "speak", confidence)
 
     def falls_silent(self, at: Seconds) -> None:
         if self.speaks_since is None:
@@ -193,9 +204,16 @@ class Conversation:
     # -- signs in the robot's turn ------------------------------------------------------------------------------
 
     def _signs(self, action: Action, at: Seconds, confidence: Probability, *, beside: bool = False) -> None:
-        if self._sign is not None and self._sign.until is not None:
-            self._was_backchannel(self._sign, self._sign.until)  # its words have not come until the next one begins
+        self._next_sign_begins()
+        self._turned_at = at
         self._joins(SignPart(action, at, confidence), beside=beside)
+
+    def _next_sign_begins(self) -> None:
+        """Decide the sign if it is over: its words have not come until the next one begins."""
+        if self._sign is not None and self._sign.until is not None:
+            self._judge(self._sign.until)
+        if self._sign is not None and self._sign.until is not None:
+            self._was_backchannel(self._sign, self._sign.until)
 
     def _joins(self, part: SignPart, *, beside: bool = False) -> None:
         """Make a part of the sign that goes on, or of a new one."""
@@ -210,7 +228,7 @@ class Conversation:
         last = sign.speeches[-1].since if sign is not None and sign.speeches else None
         if sign is None or (last is not None and (self._listens(last) or self._is_echo(last))):
             return inf
-        if not self._is_worded:
+        if not self._scene.is_worded:
             return sign.deadline(self._config.backchannel_limit)
         if sign.is_beside:
             return sign.deadline(self._scene.longest_unknown, WORDS_AFTER)
@@ -219,17 +237,10 @@ class Conversation:
     @property
     def beside_since(self) -> Seconds | None:
         """Start of what the person says while the robot speaks to others, as long as it may be a turn."""
-        return self._sign.since if self._sign is not None and self._sign.is_beside else None
-
-    @property
-    def _is_worded(self) -> bool:
-        """True if words of what the person says now may come, and would decide what it is."""
-        return self._is_in_robots_words and self._scene.is_worded
-
-    @property
-    def _is_in_robots_words(self) -> bool:
-        """True while the robot speaks to the person, or to others while the person makes a sign."""
-        return self.robot_holds_floor or (self._sign is not None and self._sign.is_beside)
+        sign = self._sign
+        if sign is None or not sign.is_beside or all(self._is_echo(speech.since) for speech in sign.speeches):
+            return None
+        return sign.since
 
     def _sign_is_due(self, at: Seconds) -> None:
         """Decide the sign: its speech has become too long for a backchannel, or its words have not come."""
@@ -248,7 +259,7 @@ class Conversation:
         heard = [(self._listens(speech.since), speech) for speech in sign.speeches]
         interrupts = next((speech for listens, speech in heard if listens is False), None)
         is_known = (
-            not self._is_worded
+            not self._scene.is_worded
             or sign.is_wordless
             or all(listens or self._is_echo(speech.since) for listens, speech in heard)
         )
@@ -258,27 +269,30 @@ class Conversation:
             self._was_backchannel(sign, sign.until)
 
     def _was_backchannel(self, sign: ListenerSign, until: Seconds) -> None:
+        """Take the sign for a backchannel, but for sounds without words: these are noise where words are told."""
         if sign is self._sign:
             self._sign = None
-        for echo in [speech for speech in sign.speeches if self._is_echo(speech.since)]:
-            sign.parts.remove(echo)
-            self._echo = echo
-            self._tell_listening(echo, until)
-        if all(part.action == "point" for part in sign.parts):
-            return  # a point in the robot's turn directs the gaze, and says nothing
-        event = self._backchannel(self._scene.robot, self.id, sign.since, sign.confidence)
         for speech in sign.speeches:
             self._tell_listening(speech, until)
-        if sign.speeches:
-            event.spoken = tuple(SpeechStart(self.id, speech.since) for speech in sign.speeches)
-            self._brief = sign.speeches[-1].since, sign.speeches[-1].until
+            self._echo = speech if self._is_echo(speech.since) else self._echo
+            self._brief[speech.since] = speech.until, self._is_noise(speech.since)
+        parts = [part for part in sign.parts if part.action != "speak" or not self._is_noise(part.since)]
+        if all(part.action == "point" for part in parts):
+            return  # a point in the robot's turn directs the gaze, and says nothing
+        told = ListenerSign(parts)
+        event = self._backchannel(self._scene.robot, self.id, told.since, told.confidence)
+        event.spoken = tuple(SpeechStart(self.id, speech.since) for speech in told.speeches)
         self.own_backchannel.speaks(event)
-        self.own_backchannel.ends(until)
+        self.own_backchannel.ends(until if told.until is None else told.until)
+
+    def _is_noise(self, since: Seconds) -> bool:
+        """True if no words of a speech are known, where they would be."""
+        return self._scene.is_worded and not says_words(self._writer.text_of(self.id, since))
 
     def _tell_listening(self, speech: SignPart, at: Seconds) -> None:
         """Tell that a speech was a listener's, or noise where its words would have come."""
-        is_noise = self._scene.is_worded and not says_words(self._writer.text_of(self.id, speech.since))
-        self._writer.interject(self.id, speech.since, "noise" if is_noise else "backchannel", at)
+        reading: InterjectionReading = "noise" if self._is_noise(speech.since) else "backchannel"
+        self._writer.interject(self.id, speech.since, reading, at)
 
     def _answers(self, part: SignPart, at: Seconds, reading: InterjectionReading = "interruption") -> None:
         """Take a part of the sign as a turn of the person since it began. Speech before it was a listener's."""
@@ -288,7 +302,8 @@ class Conversation:
         self._sign = None
         if part.action == "speak":
             self._writer.interject(self.id, part.since, reading, at)
-            self._human_turn(part.since, "speak", part.confidence)
+            if not self._is_before_question(part.since):
+                self._human_turn(part.since, "speak", part.confidence)
         elif self.pair.human_begins(part.action, part.since, part.confidence) and part.until is not None:
             self.pair.ends(part.action, part.until, by_robot=False)
 
@@ -305,7 +320,7 @@ class Conversation:
                 return
 
     def understand(self, since: Seconds, at: Seconds) -> None:
-        """Judge speech in the robot's turn by its words, if they are known before the turn is over.
+        """Judge speech in the robot's turn by its words, if they are known before that or the sign is over.
 
         They may come when its length has already decided: a "stop" was too short for an answer, and "yes, yes, okay"
         too long for a backchannel.
@@ -317,20 +332,21 @@ class Conversation:
             self._judge(at)
             return
         pair, listens = self.pair, self._listens(since)
+        until, was_noise = self._brief.get(since, (None, False))
         if self._echo is not None and self._echo.since == since and says_words(self._writer.text_of(self.id, since)):
             self._was_no_echo(self._echo, at, listens=listens)
-        elif listens:
-            if pair.was_listening(since):
-                part = SignPart("speak", since, self._speech_confidence, self._speeches.get(since))
-                if part.until is None:
-                    self._joins(part)
-                else:
-                    self._was_backchannel(ListenerSign([part]), part.until)
-        elif listens is False and self._brief is not None and self._brief[0] == since:
+        elif listens and (was_noise or pair.was_listening(since)):
+            part = SignPart("speak", since, self._speech_confidence, self._speeches.get(since))
+            if part.until is None:
+                self._joins(part)
+            else:
+                self._was_backchannel(ListenerSign([part]), part.until)
+        elif listens is False and since in self._brief:
             self._writer.interject(self.id, since, "interruption", at)
             self._human_turn(since, "speak", self._speech_confidence)
-            if self._brief[1] is not None:
-                pair.ends("speak", self._brief[1], by_robot=False)
+            del self._brief[since]
+            if until is not None:
+                pair.ends("speak", until, by_robot=False)
 
     def _was_no_echo(self, part: SignPart, at: Seconds, *, listens: bool | None) -> None:
         """Take what was nothing but the robot's words for speech: the person's have come."""
@@ -340,7 +356,8 @@ class Conversation:
             self._was_backchannel(ListenerSign([part]), until)
             return
         self._writer.interject(self.id, part.since, "interruption" if listens is False else "answer", at)
-        self.has_said(part.since, until, part.confidence)
+        self._human_turn(part.since, "speak", part.confidence)
+        self.pair.ends("speak", until, by_robot=False)
 
     def _is_echo(self, since: Seconds) -> bool:
         """True if nothing but the robot's own words is known of a speech."""
@@ -349,8 +366,10 @@ class Conversation:
 
     def _listens(self, since: Seconds) -> bool | None:
         """True if the words of a speech are a listener's; None: they are unknown, or not said to the robot's turn."""
-        words, event = self._writer.text_of(self.id, since), self.pair.event
-        if not says_words(words) or not self._is_in_robots_words or (event is not None and since < event.started):
+        words, event, sign = self._writer.text_of(self.id, since), self.pair.event, self._sign
+        is_sign = sign is not None and any(speech.since == since for speech in sign.speeches)
+        is_heard = (is_sign or self.robot_holds_floor) and (event is None or since >= event.started)
+        if not says_words(words) or not is_heard:
             return None
         return is_listening(words)
 
@@ -399,7 +418,7 @@ class Conversation:
 
     def robot_speaks(self, at: Seconds, *, listens: bool) -> None:
         """Take the beginning of the robot's speech. listens: it is a backchannel that was announced."""
-        self.robot_speaks_since = at
+        self.robot_speaks_since = self._turned_at = at
         self.pair.robot_heard(None)
         if self.holds_floor and not self.pair.robot_holds_turn:
             if self.robot_backchannel.state != BRIEF and not self.pair.is_cut_into:
@@ -410,8 +429,8 @@ class Conversation:
 
     def robot_falls_silent(self, at: Seconds) -> None:
         self.robot_speaks_since = None
-        if self._sign is not None:
-            self._sign.is_beside = False
+        if self._sign is not None and self._sign.is_beside:
+            self._keep_floor(at)
         self.pair.robot_heard(at)
         listening, since = self.robot_backchannel, self.robot_backchannel.undecided_since
         if listening.state == BRIEF or (since is not None and in_time(at, since + self._config.backchannel_limit)):
@@ -449,9 +468,9 @@ class Conversation:
 
     def _floor_is_free(self, at: Seconds) -> None:
         """Turn undecided speech that outlasts the other's turn into a turn of its own."""
-        if not self._is_in_robots_words:
+        if not self.robot_holds_floor and (self._sign is None or not self._sign.is_beside):
             self._keep_floor(at)
-            self._brief = None
+            self._brief.clear()
         if self.robot_backchannel.state == UNDECIDED and not self.holds_floor:
             self._robot_takes_floor(at, "outlasts_turn")
 
@@ -509,6 +528,7 @@ class Conversation:
             self.robot_backchannel.ends(max(event.started, ended))
 
     def robot_asks(self, event: OngoingEvent) -> None:
+        self._turned_at = event.started
         if self.robot_backchannel.state == UNDECIDED:
             self.robot_backchannel.takes_floor("outlasts_turn", event.started)
         if self.pair.robot_cuts_into_turn(event.started):

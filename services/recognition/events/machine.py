@@ -208,6 +208,12 @@ class EventWriter:
         self._interjected[SpeechStart(person, speech)] = told
         self.effects.append(told)
 
+    def decide_interjection(self, person: str, speech: Seconds, reading: InterjectionReading, at: Seconds) -> None:
+        """Tell what it is that somebody says into the robot's turn, if only that it began has been told."""
+        told = self._interjected.get(SpeechStart(person, speech))
+        if told is not None and told.reading == "open":
+            self.interject(person, speech, reading, at)
+
     def interject_again(self, person: str, speech: Seconds, at: Seconds) -> None:
         """Tell once more what somebody has said into the robot's turn if its words are others by now."""
         told, words = self._interjected.get(SpeechStart(person, speech)), self.text_of(person, speech)

@@ -194,7 +194,7 @@ class People:
                 self._apply(self.persons[taken_up.asked], at, partial(_answered_by_other, taken_up))
         while self._writer.answered:
             told = partial(_answered_for_all, *self._writer.answered.pop())
-            for person in list(self._here.values()):
+            for person in list(self.persons.values()):  # who has left meanwhile was asked, too
                 self._apply(person, at, told)
 
     def _looks_may_direct(self, at: Seconds) -> None:

@@ -479,6 +479,7 @@ class Session:
         speaks = any(name.startswith(f"{block}:") and action == "speak" for name, action in self._robot_actions)
         if speaks and actor and said is not None and said.to is not None and not said.is_to(actor):
             said.to |= {actor}
+            self.scene.floor_changes += 1
             self._tell(actor, at, lambda talk: talk.robot_speaks(max(said.since, at), listens=False))
 
     def _opens(self, turn: str, addressee: str) -> None:
@@ -527,7 +528,7 @@ class Session:
     def _abort(self, actor: str, at: Seconds, turn: str) -> None:
         """End the pairs of a turn that was cut off; first that of who has cut in, which may answer for all."""
         here = [person for person in self.persons.values() if person.presence.here and actor in ("", person.id)]
-        for person in sorted(here, key=lambda each: not each.talk.takes_floor):
+        for person in sorted(here, key=lambda each: each.talk.takes_floor_since):
             self._people.apply(person.id, at, lambda person: person.abort(at, turn=turn))
 
     def _apply_to_addressees(self, actor: str, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:

@@ -69,9 +69,9 @@ class Talk(KindRecognizer):
         return self._speech is not None and self._speech.is_to(self._scene.robot)
 
     @property
-    def takes_floor(self) -> bool:
-        """True while the person speaks to the robot, or has answered before its turn is over."""
-        return self._conversation.holds_floor or self._conversation.pair.is_interrupted
+    def takes_floor_since(self) -> Seconds:
+        """Start of what the person says to the robot now, or has answered into its turn; infinite: of nothing."""
+        return self._conversation.takes_floor_since
 
     @property
     def question(self) -> Question | None:
@@ -148,13 +148,14 @@ class Talk(KindRecognizer):
         self._speech = speech = self._own_speech(at, confidence, face)
         speech.told, speech.words = self._scene.told_to(self.id, at), self._writer.text_of(self.id, at)
         # What waits in line may be the robot's own turn, so that only the scene knows that it has begun.
-        said_now = self._scene.robot_speaks_to(self.id) if self._line else None
-        is_into_turn = self._conversation.is_into_turn(at) or (said_now is not None and said_now <= at)
         said = self._scene.robot_spoken
-        speech.is_beside = said is not None and said.since <= at and not said.is_to(self.id)
+        is_into_words = said is not None and said.since <= at
+        is_to_person = said is not None and said.is_to(self.id)
+        speech.is_beside = is_into_words and not is_to_person
+        is_into_turn = is_into_words and is_to_person if self._line else self._conversation.is_into_turn(at)
         is_line = self._scene.lines.get(self.id) == at
         speech.may_be_noise = self._scene.is_worded and not (is_line or speech.is_beside or says_words(speech.words))
-        is_known = self._find(speech, face, at)
+        is_known = self._find(speech, face if is_into_turn else "", at)
         if is_into_turn and (not is_known or speech.is_to(self._scene.robot)):
             self._writer.interject(self.id, at, "open", at)
             speech.is_interjected = True
@@ -177,7 +178,7 @@ class Talk(KindRecognizer):
         """
         is_asked = self._conversation.is_spoken_to
         if not self._scene.company(self.id) or face == self._scene.robot or (not face and is_asked):
-            self.take(at, step)
+            self._take_in_order(at, step)
 
     def goes_on(self, action: Action, since: Seconds, at: Seconds, confidence: Probability, face: str) -> None:
         """Take an action that goes on, known only now, at `at`. It has been decided by the looks of now to whom."""
@@ -198,25 +199,26 @@ class Talk(KindRecognizer):
                 if speech.to is None:
                     self._find(speech, "", at)
         if since in self._noises and says_words(words):
-            self._was_speech(self._noises.pop(since), words, at)
+            self._was_speech(self._noises.pop(since), words, told, at)
         self.take(at, lambda talk: talk.understand(since, at))
         self.go_on(at)
 
-    def _was_speech(self, speech: OwnSpeech, words: str, at: Seconds) -> None:
+    def _was_speech(self, speech: OwnSpeech, words: str, told: Addressees | None, at: Seconds) -> None:
         """Take a sound for speech after all: its words have come late."""
-        speech.words, speech.is_noise, speech.to = words, False, None
+        speech.words, speech.told, speech.is_noise, speech.to = words, told or speech.told, False, None
         if not self._find(speech, "", at):
             self._likely(speech, at)
         waits = any(each is speech for _, each in self._line)
         if speech.is_to(self._scene.robot) and speech.until is not None and not waits:
             since, until, confidence = speech.since, speech.until, speech.confidence
-            self.take(at, lambda talk: talk.has_said(since, until, confidence))
+            self.take_early(since, lambda talk: talk.has_said(since, until, confidence))
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         """Take the person's leaving: nothing waits any longer."""
         if self._speech is not None and self._speech.until is None:
             self._speech.until = until
         self._speech = None
+        self._noises.clear()
         for speech in self._undecided:
             self._decide(speech, at)
         self.go_on(at)
@@ -265,6 +267,10 @@ class Talk(KindRecognizer):
         self._is_asked_in_line = bool(self._line)
         if ended is not None:
             self.take(at, lambda talk: talk.turn_ends(max(ended, at)))
+
+    def robot_begins(self, began: ActionBegan, at: Seconds) -> None:
+        if began.action == "speak" and not self._scene.is_listening(began.behavior):
+            self.take(at, lambda talk: talk.pair.forget_unanswered(at))
 
     def robot_stops(self, action: Action, at: Seconds) -> None:
         if not self.is_under_way:
@@ -319,7 +325,9 @@ class Talk(KindRecognizer):
         is_line = self._scene.lines.get(self.id) == speech.since
         to = certain(speech, company, self._scene.robot, self._scene.names, is_line=is_line)
         if to is None and face == self._scene.robot and not self._line and self._conversation.is_spoken_to:
-            to = frozenset((face,))  # who has been asked, and looks at who has asked, answers
+            to = frozenset(
+                (face,)
+            )  # who speaks into the robot's words to them, and looks at it: it should hold at once
         if to is not None:
             self._address(speech, to, at)
         return to is not None
@@ -342,6 +350,7 @@ class Talk(KindRecognizer):
         if self._may_be_noise(speech) and speech.until is not None:
             speech.may_be_noise, speech.is_noise, speech.to = False, True, NOBODY
             self._noises[speech.since] = speech
+            self._writer.decide_interjection(self.id, speech.since, "noise", at)
             return
         speech.may_be_noise = False
         if speech.to is None:

@@ -146,12 +146,13 @@ class Words:
     def _told_early(self, person: _Person, words: TimedWords, *, is_echo: bool) -> Worded | None:
         """News that words will come, and addressees that perception knows before it is sure of these.
 
-        They may come before the speech itself does.
+        They may come before the speech itself does. Without words it is addressees alone that are told, if any are.
         """
+        is_announced = bool(words.text) or words.to is None
         last = person.speeches[-1] if person.speeches else None
         if last is not None and words.began < last.until:
             return Worded(
-                actor=words.actor, since=last.since, text="", is_announced=bool(words.text), is_echo=is_echo,
+                actor=words.actor, since=last.since, text="", is_announced=is_announced, is_echo=is_echo,
                 to=words.to,
             )  # fmt: skip
         return None if words.to is None else Worded(actor=words.actor, since=words.began, text="", to=words.to)

@@ -57,18 +57,20 @@ def quality(failed: int, judged: int) -> Probability:
 
 
 def next_level(
-    level: EngagementLevel, value: Probability, config: RecognitionConfig, *, lasts: bool
+    level: EngagementLevel, value: Probability, config: RecognitionConfig, *, in_contact: bool, lasts: bool
 ) -> EngagementLevel:
     """Level of `value`; it changes only when the value has passed a threshold by the hysteresis.
 
-    lasts: the contact of who is engaging has lasted; until then nobody becomes engaged.
+    in_contact: the person is; nobody comes back by what the robot does. lasts: the contact of who is engaging has
+    lasted; until then nobody becomes engaged.
     """
     margin = 0.0 if level == "unknown" else HYSTERESIS
     engaged_from = config.engaged_from + (-margin if level == "engaged" else margin)
     disengaged_below = config.disengaged_below + (margin if level == "disengaged" else -margin)
-    if value >= engaged_from and (level in ("engaged", "disengaging") or (level == "engaging" and lasts)):
+    comes = level == "engaged" or (level == "disengaging" and in_contact) or (level == "engaging" and lasts)
+    if value >= engaged_from and comes:
         return "engaged"
-    if value < disengaged_below:
+    if value < disengaged_below or (level == "disengaged" and not in_contact):
         return "disengaged"
     return "disengaging" if level in ("engaged", "disengaging") else "engaging"
 
@@ -146,7 +148,7 @@ class Engagement:
         value = sum(known) / len(known)
         is_in_contact = self.contact.now is None or self.contact.now >= IN_CONTACT
         lasts = is_in_contact and now >= self.level_since + ENGAGES_AFTER
-        level = next_level(self.estimate.level, value, self._config, lasts=lasts)
+        level = next_level(self.estimate.level, value, self._config, in_contact=is_in_contact, lasts=lasts)
         return EngagementEstimate(value, level, tuple(reasons))
 
     def _pace(self, now: Seconds) -> tuple[Probability, tuple[str, str]]:
