@@ -211,7 +211,7 @@ TABLE: tuple[Row, ...] = (
         keys.ANY_INTERJECTION, keys.FLOOR, keys.SAME_PEOPLE,
         heard=(keys.ROBOT_ACTION, keys.PERCEIVED_ACTION, keys.UTTERANCE, keys.ROBOT_ONGOING,
                keys.ANY_PERCEIVED_ONGOING,
-               keys.FEEDBACK, keys.HEAD_OWNER, keys.WORLD, *_RAW, keys.ROBOT_STATE),
+               keys.FEEDBACK, keys.HEAD_OWNER, keys.WORLD, *_RAW, keys.ROBOT_STATE, keys.SYNC_POINT),
     ),
     *_service(
         "control", keys.SYNC_POINT, keys.ROBOT_ACTION, keys.ROBOT_ONGOING, keys.ROBOT_STATE, keys.ROBOT_MOTION,

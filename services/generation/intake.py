@@ -46,6 +46,7 @@ from engage_hri.services.reports.in_force import Publisher, WorldReport
 from engage_hri.services.reports.ongoing_actions import GoesOn, TimedReport
 from engage_hri.services.reports.same_people import PeopleNames
 from engage_hri.services.runtime.intake import AnswerRequest, Input, MachineClocks, PublishMessage, TellMistake
+from engage_hri.services.text.own_words import OwnWords
 
 WORLD_PATIENCE: Seconds = 5.0
 """Time that a fragment waits for a first report of the world, or for a person to speak to: cameras start as the robot
@@ -87,6 +88,8 @@ class GenerationIntake:
             robot, config, clock, session, self._sight, self._arbiter, self._leases, self._outputs.append
         )
         self._objects = CoveredObjects(COVERED_FOR)
+        self._own_words = OwnWords()
+        """Words of the robot, which are nobody's when they are heard back."""
         self._reports = ActionReports(robot, REPORT_GRACE, clock.name, self._instant)
         self._perception = Publisher()
         self._seen = WorldReport(REPORT_GRACE)
@@ -176,8 +179,14 @@ class GenerationIntake:
                     self._arbiter.feed(message, now)
             case RobotState() | Statistics() | Floor():
                 self._arbiter.feed(message, now)
-            case Interjection() | Utterance() | SyncPointProgress() | WordSpoken():
+            case Interjection() | SyncPointProgress():
                 self._fragments.feed(message, now)
+            case WordSpoken(word=word, at=at):
+                self._own_words.says(word, self._instant(at))
+                self._fragments.feed(message, now)
+            case Utterance(text=text, began=began, final=is_final):
+                is_echo = began != message.at and self._own_words.are(text, self._instant(began), is_final=is_final)
+                self._fragments.feed(replace(message, text="") if is_echo else message, now)
             case Unreadable(block=block, fault=fault):
                 self._warn(block, "PARSING_FAILURE", fault.within(block))
             case PeerGone(participant="control"):
@@ -198,6 +207,8 @@ class GenerationIntake:
                 case ActionBegan() | ActionEnded():
                     if isinstance(observation, ActionEnded):
                         self._fragments.feed(observation, self._now)
+                    elif observation.actor == self._robot and observation.action == "speak":
+                        self._own_words.begins(self._instant(observation.at))
                     if observation.actor != self._robot:
                         self._arbiter.feed(observation, self._now)
                 case ActorFound() | ActorLost():

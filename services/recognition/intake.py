@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import BlockProgress, SyncPointProgress
-from engage_hri.schemas.body import RobotState
+from engage_hri.schemas.body import RobotState, WordSpoken
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import HeadOwner
 from engage_hri.schemas.participants import PeerAlive, PeerGone
@@ -73,7 +73,7 @@ from engage_hri.services.runtime.intake import (
 )
 
 Content = (
-    ActionBegan | ActionEnded | ActorFound | ActorLost | OngoingActions | World | RobotState | HeadOwner
+    ActionBegan | ActionEnded | ActorFound | ActorLost | OngoingActions | World | RobotState | HeadOwner | WordSpoken
     | SyncPointProgress | BlockProgress | HeadPose | VoiceActivity | Utterance | RequestEvent | SignalTurn | Cancel
     | PeerAlive | PeerGone | ConnectionEvent | Statistics | SamePeople | OpenEvents
 )  # fmt: skip

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from itertools import count
 
-from engage_hri.schemas.body import RobotState
+from engage_hri.schemas.body import RobotState, WordSpoken
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose, VoiceActivity
 from engage_hri.schemas.recognition import RequestEvent, SignalTurn
 from engage_hri.schemas.units import Probability, Seconds
@@ -31,7 +31,7 @@ from engage_hri.services.reports.same_people import renamed
 OLDEST: Seconds = 0.5
 """Greatest age at which a head pose or a voice level that arrives still counts: an older one tells of what has been
 decided. Ours."""
-Perceived = Observation | HeadPose | VoiceActivity | RobotState | TimedWords
+Perceived = Observation | HeadPose | VoiceActivity | RobotState | WordSpoken | TimedWords
 Result = Effect | Symbolic
 """The actions among them were derived from raw perception; the session gets them without another call."""
 
@@ -91,6 +91,8 @@ class Recognizer:
                 if (covered := self._attention.covered) != self._covered:
                     self._covered = covered
                     self._wait(covered, at)
+            case WordSpoken(word=word):
+                self._words.own.says(word, at)
             case ActionBegan(confidence=confidence) | TimedWords(confidence=confidence) if (
                 confidence < self._config.least_confidence
             ):
@@ -216,6 +218,8 @@ class Recognizer:
                 self._words.follow(observation, at)
             case GoesOn(began=began, since=since) if began.actor != self.session.robot:
                 self._words.follow(began, since)
+            case ActionBegan(action="speak"):
+                self._words.own.begins(at)
         heapq.heappush(self._waiting, (at, next(self._numbers), observation))
 
     @property

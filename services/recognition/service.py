@@ -36,7 +36,7 @@ async def recognize(bus: Bus, ready: Ready, config: RecognitionConfig) -> None:
     recognition = _Recognition(bus, config)
     patterns = (
         keys.ROBOT_ACTION, keys.PERCEIVED_ACTION, keys.UTTERANCE, keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING,
-        keys.FEEDBACK, keys.HEAD_OWNER, keys.WORLD,
+        keys.FEEDBACK, keys.HEAD_OWNER, keys.WORLD, keys.SYNC_POINT,
         keys.ANY_HEAD_POSE, keys.ANY_VOICE_ACTIVITY, keys.ROBOT_STATE,
         *RequestDesk.patterns("recognition"),
     )  # fmt: skip

@@ -49,6 +49,11 @@ def says_words(text: str) -> bool:
     return bool(_plain(text))
 
 
+def plain_words(text: str) -> list[str]:
+    """Split a text into words by which two recognizers' spellings of it are compared. What is in brackets is none."""
+    return _plain(text).split()
+
+
 def _plain(text: str) -> str:
     """Lower case, one blank between words, no signs, no letter twice in a row, no syllable more often than twice.
 

@@ -17,6 +17,7 @@ from engage_hri.services.generation.turns.outcomes import MOST as WORDS_KEPT
 from engage_hri.services.generation.turns.outcomes import PEOPLE
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT
 from engage_hri.services.recognition.events.machine import INTERJECTIONS_KEPT, TEXTS_KEPT
+from engage_hri.services.recognition.events.scene import SPOKEN_KEPT
 from engage_hri.services.recognition.events.session import ACTIONS_KEPT, TURNS_KEPT
 from engage_hri.services.recognition.perceive.clock_errors import PEOPLE_KEPT
 from engage_hri.services.recognition.perceive.clock_restarts import REPORTERS_KEPT
@@ -37,6 +38,7 @@ LIMITS = {
     "_channel_ids": MOST_CHANNELS, "channel_message_counts": MOST_CHANNELS,
     "_clocks": REPORTERS_KEPT, "_addressed": BLOCKS_KEPT, "_indices": FULL_CHUNK // 31, "records": FULL_CHUNK // 31,
     "_seen": IDS_KEPT, "joints": 20, "kinds": 4, "_heap": 4 * SLACK, "_heap[*]": 4, "_scheduled": 400,
+    "echoes": SPOKEN_KEPT,
 }  # fmt: skip
 """Containers that are bounded by number, not by time: a message of a recording has 31 bytes at least.
 `joints` and `kinds` are of the message that a service has read last, whichever it was. The last two drop what is

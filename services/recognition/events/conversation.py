@@ -56,6 +56,8 @@ class Conversation:
         self._brief: Latest[Seconds, tuple[Seconds | None, bool]] = Latest(SPEECHES_KEPT)
         """Speeches of the person within the robot's turn that have been no answer so far, by their starts: the end,
         and whether they were noise."""
+        self._echo: SignPart | None = None
+        """The last of what was nothing but the robot's own words in its turn. More words of it may come."""
         self._scene = scene
         self._config = config
         self._writer = writer
@@ -223,7 +225,8 @@ class Conversation:
     @property
     def _sign_deadline(self) -> Seconds:
         sign = self._sign
-        if sign is None or (sign.speeches and self._listens(sign.speeches[-1].since)):
+        last = sign.speeches[-1].since if sign is not None and sign.speeches else None
+        if sign is None or (last is not None and (self._listens(last) or self._is_echo(last))):
             return inf
         if not self._scene.is_worded:
             return sign.deadline(self._config.backchannel_limit)
@@ -234,7 +237,10 @@ class Conversation:
     @property
     def beside_since(self) -> Seconds | None:
         """Start of what the person says while the robot speaks to others, as long as it may be a turn."""
-        return self._sign.since if self._sign is not None and self._sign.is_beside else None
+        sign = self._sign
+        if sign is None or not sign.is_beside or all(self._is_echo(speech.since) for speech in sign.speeches):
+            return None
+        return sign.since
 
     def _sign_is_due(self, at: Seconds) -> None:
         """Decide the sign: its speech has become too long for a backchannel, or its words have not come."""
@@ -252,7 +258,11 @@ class Conversation:
             return
         heard = [(self._listens(speech.since), speech) for speech in sign.speeches]
         interrupts = next((speech for listens, speech in heard if listens is False), None)
-        is_known = not self._scene.is_worded or sign.is_wordless or all(listens for listens, _ in heard)
+        is_known = (
+            not self._scene.is_worded
+            or sign.is_wordless
+            or all(listens or self._is_echo(speech.since) for listens, speech in heard)
+        )
         if interrupts is not None:
             self._answers(interrupts, at)
         elif sign.until is not None and is_known:
@@ -264,6 +274,7 @@ class Conversation:
             self._sign = None
         for speech in sign.speeches:
             self._tell_listening(speech, until)
+            self._echo = speech if self._is_echo(speech.since) else self._echo
             self._brief[speech.since] = speech.until, self._is_noise(speech.since)
         parts = [part for part in sign.parts if part.action != "speak" or not self._is_noise(part.since)]
         if all(part.action == "point" for part in parts):
@@ -302,6 +313,8 @@ class Conversation:
         Of several parts it is the one that began first. A gesture that answers nothing here stays what it is.
         """
         for part in self._sign.going_on() if self._sign is not None else ():
+            if part.action == "speak" and self._is_echo(part.since):
+                continue
             if part.action == "speak" or self.pair.may_be_answered_with(part.action):
                 self._answers(part, at, reading)
                 return
@@ -312,12 +325,17 @@ class Conversation:
         They may come when its length has already decided: a "stop" was too short for an answer, and "yes, yes, okay"
         too long for a backchannel.
         """
-        if self._sign is not None and any(speech.since == since for speech in self._sign.speeches):
+        in_sign = [] if self._sign is None else [each for each in self._sign.speeches if each.since == since]
+        if in_sign:
+            if self._is_echo(since):
+                self._tell_listening(in_sign[0], at)  # the robot need not wait until it is over
             self._judge(at)
             return
         pair, listens = self.pair, self._listens(since)
         until, was_noise = self._brief.get(since, (None, False))
-        if listens and (was_noise or pair.was_listening(since)):
+        if self._echo is not None and self._echo.since == since and says_words(self._writer.text_of(self.id, since)):
+            self._was_no_echo(self._echo, at, listens=listens)
+        elif listens and (was_noise or pair.was_listening(since)):
             part = SignPart("speak", since, self._speech_confidence, self._speeches.get(since))
             if part.until is None:
                 self._joins(part)
@@ -329,6 +347,22 @@ class Conversation:
             del self._brief[since]
             if until is not None:
                 pair.ends("speak", until, by_robot=False)
+
+    def _was_no_echo(self, part: SignPart, at: Seconds, *, listens: bool | None) -> None:
+        """Take what was nothing but the robot's words for speech: the person's have come."""
+        self._echo, until = None, part.until
+        assert until is not None
+        if listens:
+            self._was_backchannel(ListenerSign([part]), until)
+            return
+        self._writer.interject(self.id, part.since, "interruption" if listens is False else "answer", at)
+        self._human_turn(part.since, "speak", part.confidence)
+        self.pair.ends("speak", until, by_robot=False)
+
+    def _is_echo(self, since: Seconds) -> bool:
+        """True if nothing but the robot's own words is known of a speech."""
+        is_echo = (self.id, since) in self._scene.echoes
+        return is_echo and not says_words(self._writer.text_of(self.id, since))
 
     def _listens(self, since: Seconds) -> bool | None:
         """True if the words of a speech are a listener's; None: they are unknown, or not said to the robot's turn."""

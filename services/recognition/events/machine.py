@@ -200,9 +200,10 @@ class EventWriter:
 
     def interject(self, person: str, speech: Seconds, reading: InterjectionReading, at: Seconds) -> None:
         """Tell what somebody says into the robot's turn; that it begins, once. speech: its start."""
-        if reading == "open" and SpeechStart(person, speech) in self._interjected:
-            return
         words, stamp = self.text_of(person, speech), self.stamp
+        before = self._interjected.get(SpeechStart(person, speech))
+        if before is not None and (reading == "open" or (before.reading, before.words) == (reading, words)):
+            return
         told = Interjection(actor=person, since=stamp(speech), at=stamp(at), reading=reading, words=words)
         self._interjected[SpeechStart(person, speech)] = told
         self.effects.append(told)

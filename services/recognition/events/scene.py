@@ -42,7 +42,7 @@ class Worded(Struct, frozen=True, kw_only=True):
     """Observation: all that is known of the words of a person's speech. since: local time at which that began.
 
     is_alone: nothing but the words tells of this speech, and it is told next. is_line: it was typed in no time.
-    is_announced: words of it have been told that are not final.
+    is_announced: words of it have been told that are not final, or are the robot's. is_echo: they are the robot's.
     """
 
     actor: str
@@ -51,6 +51,7 @@ class Worded(Struct, frozen=True, kw_only=True):
     is_alone: bool = False
     is_line: bool = False
     is_announced: bool = False
+    is_echo: bool = False
     to: Addressees | None = None
     """Addressees, if perception knows them."""
 
@@ -145,6 +146,8 @@ class SessionScene:
         """Actor ids by what people call them."""
         self.is_worded = False
         """True once somebody has told spoken words, of whomever: a recognizer hears all voices."""
+        self.echoes: Latest[tuple[str, Seconds], None] = Latest(SPOKEN_KEPT)
+        """Speeches of which nothing but the robot's own words is known, by speaker and start."""
         self.tells_addressees = False
         """True if perception has ever told to whom somebody speaks."""
         self.told_addressees: Latest[tuple[str, Seconds], Addressees] = Latest(SPOKEN_KEPT)

@@ -340,6 +340,10 @@ class Session:
         if words.to is not None:
             self.scene.tells_addressees = True
             self.scene.told_addressees[words.actor, words.since] = words.to
+        if words.is_echo:
+            self.scene.echoes[words.actor, words.since] = None
+        elif words.text or words.is_announced:
+            self.scene.echoes.pop((words.actor, words.since), None)
         self.scene.is_worded |= words.is_announced or (bool(words.text) and not words.is_line)
         if words.text:
             self._writer.understand(words.actor, words.since, words.text, at)

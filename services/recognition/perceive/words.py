@@ -3,6 +3,8 @@
 Only final words count. Those of an utterance belong to the speech of that person with which they overlap longest; of
 two with the same overlap to the later one. Recognizers and voice detectors disagree about beginnings and ends, so
 words may miss the speech by a margin. A line, words that take no time, has been typed: there is no margin for it.
+
+What the robot itself says, heard back, are no words of anybody (`own_words`).
 """
 
 from math import inf
@@ -14,6 +16,7 @@ from engage_hri.schemas.units import Probability, Seconds, Stamp
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.limits import ROUNDING
 from engage_hri.services.recognition.events.scene import Worded
+from engage_hri.services.text.own_words import OwnWords
 
 WORDS_MARGIN: Seconds = 0.5
 """Time by which spoken words may miss the speech that they belong to: recognizers and voice detectors disagree about
@@ -102,6 +105,8 @@ class Words:
     def __init__(self, clock: str) -> None:
         self._clock = clock
         self._people: dict[str, _Person] = {}
+        self.own = OwnWords()
+        """Words of the robot."""
 
     def follow(self, action: ActionBegan | ActionEnded, at: Seconds) -> None:
         """Take the beginning or the end of a person's speech; other actions say nothing of words."""
@@ -116,14 +121,17 @@ class Words:
         """Take words that are known at `at`. Returns what a speech consists of now; None if they say nothing new."""
         person = self._people.get(words.actor) or _Person()
         known = person.utterances.get(words.id)
-        text = " ".join(words.text.split())
+        is_echo = not words.is_line and self.own.are(words.text, words.began, is_final=words.final)
+        text = "" if is_echo else " ".join(words.text.split())
         if not words.final:
-            return self._told_early(person, words)
+            return self._told_early(person, words, is_echo=is_echo)
         if known is not None and at <= known.at:
             return None
         speech = person.speech_with(words) if known is None else known.speech
         is_alone = speech is None
         if speech is None:
+            if is_echo:
+                return Worded(actor=words.actor, since=words.began, text="", is_announced=True)
             if not text:
                 return None
             speech = words.began
@@ -132,10 +140,10 @@ class Words:
         person.utterances[words.id] = _Known(at, words.began, text, speech)
         return Worded(
             actor=words.actor, since=speech, text=person.text_of(speech), is_alone=is_alone,
-            is_line=is_alone and words.is_line, to=words.to,
+            is_line=is_alone and words.is_line, to=words.to, is_announced=is_echo, is_echo=is_echo,
         )  # fmt: skip
 
-    def _told_early(self, person: _Person, words: TimedWords) -> Worded | None:
+    def _told_early(self, person: _Person, words: TimedWords, *, is_echo: bool) -> Worded | None:
         """News that words will come, and addressees that perception knows before it is sure of these.
 
         They may come before the speech itself does. Without words it is addressees alone that are told, if any are.
@@ -143,7 +151,10 @@ class Words:
         is_announced = bool(words.text) or words.to is None
         last = person.speeches[-1] if person.speeches else None
         if last is not None and words.began < last.until:
-            return Worded(actor=words.actor, since=last.since, text="", is_announced=is_announced, to=words.to)
+            return Worded(
+                actor=words.actor, since=last.since, text="", is_announced=is_announced, is_echo=is_echo,
+                to=words.to,
+            )  # fmt: skip
         return None if words.to is None else Worded(actor=words.actor, since=words.began, text="", to=words.to)
 
     def speech(self, words: TimedWords) -> list[ActionBegan | ActionEnded]:
