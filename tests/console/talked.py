@@ -32,9 +32,9 @@ STAGE = rb"the stage[^:]*: (http://[^\s]+)"
 PERSON = "window.stage.state.person"
 READY = "window.stage?.state.scene?.body && !document.querySelector('.sit').getAttribute('aria-disabled')"
 SAID = (
-    "hello robot", "i am fine", "what is your name", "how old are you", "can you hear me", "what can you do",
+    "hello robot", "i am fine", "what is your name", "how old are you", "can you hear me", "how are you",
     "where is the blue square", "what is on the table", "the blue one", "make me laugh", "i like you",
-    "do you hear me", "no thank you", "please help me", "show me the red square", "yes please", "what are these",
+    "do you hear me", "no thank you", "tell me a joke", "show me the red square", "i am tired", "what are these",
     "the red one", "thank you very much", "i have to go now",
 )  # fmt: skip
 """What the visitor says, one after the other."""
