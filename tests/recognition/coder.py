@@ -178,6 +178,8 @@ class Coder:
             and turn.since < each.since < turn.until
         ]  # fmt: skip
         self._used |= {id(each) for each in signs}
+        if turn.is_aborted:
+            signs = self._without_late(signs, turn)
         every, signs = signs, [each for each in signs if not self._goes_with_words(each, turn)]
         found: list[Span] = []
         sets = [*self._together(signs)]
@@ -233,6 +235,17 @@ class Coder:
         speech = [each for each in self._timeline.spans if each.who == side.person and each.action == "speak"]
         beside = any(each.to == ROBOT and each.since < turn.since and turn.until < each.until for each in speech)
         return beside and turn.until[0] - turn.since[0] <= BRIEF + ROUND
+
+    def _without_late(self, signs: list[Span], turn: Turn) -> list[Span]:
+        """Leave out what is said before a turn is cut off, and known to be no listener's only later: it is a turn."""
+        late = [
+            each for each in signs
+            if each.known is not None and turn.until <= each.known and each.until < turn.until
+            and self._is_heard(each) and each.words not in LISTENING
+        ]  # fmt: skip
+        self._turns |= {id(each) for each in late}
+        beside = [each for each in signs for one in late if one.since <= each.since < one.until]
+        return [each for each in signs if each not in beside]
 
     def _shows(self, sign: Span) -> bool:
         """True for what shows that somebody listens: a nod, or words; any sound only where no words are told."""

@@ -247,5 +247,9 @@ class Drawing:
             if not self._is_away(to, at - 2.5, until[0] + 0.1):
                 turn = Turn(f"turn{len(self.timeline.turns)}", kind, to, speech, until)
                 turn.is_aborted = kind == "asks" and chance.random() < 0.15
+                if turn.is_aborted and len(self.timeline.people) > 1:  # words after the cut: it depends on what waits
+                    for one in spoken:
+                        if one.who == to and one.known is not None and one.until <= until <= one.known:
+                            one.known = one.until[0], one.until[1] + 1
                 self.timeline.turns.append(turn)
             at = until[0] + chance.choice((self._between(0.2, 2.0), self._between(0.5, 9.0)))

@@ -84,6 +84,8 @@ class AdjacencyPair(Machine):
         self._unanswered: OngoingEvent | None = None
         """The robot's last pair, if its limit passed without an answer and nobody has begun a turn since."""
         self._forgotten_at: Seconds = NEVER
+        self.interrupted_until: Seconds = NEVER
+        """End of the robot's last turn that was answered before it ended: all said in it is part of that answer."""
 
     @property
     def robot_holds_turn(self) -> bool:
@@ -190,6 +192,7 @@ class AdjacencyPair(Machine):
         if self.event is None or self._turn_end is not None:
             return
         if self.state == INTERRUPTED:
+            self.interrupted_until = at if self._by_robot else self.interrupted_until
             self._turn_end = at
             self.event.delay = self._response_since - at
             self.step("turn_ends", at)

@@ -159,7 +159,7 @@ class Conversation:
             self._writer.interject(self.id, at, "interruption", at)
         else:
             self._writer.decide_interjection(self.id, at, "answer", at)
-            self._next_sign_begins()
+            self.next_sign_begins()
         if not self._is_before_question(at):
             self._human_turn(at, "speak", confidence)
             self._robot_has_answered(at)
@@ -204,11 +204,11 @@ class Conversation:
     # -- signs in the robot's turn ------------------------------------------------------------------------------
 
     def _signs(self, action: Action, at: Seconds, confidence: Probability, *, beside: bool = False) -> None:
-        self._next_sign_begins()
+        self.next_sign_begins()
         self._turned_at = at
         self._joins(SignPart(action, at, confidence), beside=beside)
 
-    def _next_sign_begins(self) -> None:
+    def next_sign_begins(self) -> None:
         """Decide the sign if it is over: its words have not come until the next one begins."""
         if self._sign is not None and self._sign.until is not None:
             self._judge(self._sign.until)
@@ -302,7 +302,7 @@ class Conversation:
         self._sign = None
         if part.action == "speak":
             self._writer.interject(self.id, part.since, reading, at)
-            if not self._is_before_question(part.since):
+            if not self._is_before_question(part.since) and part.since >= self.pair.interrupted_until:
                 self._human_turn(part.since, "speak", part.confidence)
         elif self.pair.human_begins(part.action, part.since, part.confidence) and part.until is not None:
             self.pair.ends(part.action, part.until, by_robot=False)

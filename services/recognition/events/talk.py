@@ -159,6 +159,8 @@ class Talk(KindRecognizer):
         if is_into_turn and (not is_known or speech.is_to(self._scene.robot)):
             self._writer.interject(self.id, at, "open", at)
             speech.is_interjected = True
+        if not self._line:
+            self._conversation.next_sign_begins()
         self._queue(at, speech)
 
     def _falls_silent(self, at: Seconds) -> None:
