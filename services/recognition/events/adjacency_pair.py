@@ -192,7 +192,8 @@ class AdjacencyPair(Machine):
         if self.event is None or self._turn_end is not None:
             return
         if self.state == INTERRUPTED:
-            self.interrupted_until = at if self._by_robot else self.interrupted_until
+            if self._by_robot:
+                self.interrupted_until = at
             self._turn_end = at
             self.event.delay = self._response_since - at
             self.step("turn_ends", at)

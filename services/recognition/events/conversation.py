@@ -225,8 +225,7 @@ class Conversation:
     @property
     def _sign_deadline(self) -> Seconds:
         sign = self._sign
-        last = sign.speeches[-1].since if sign is not None and sign.speeches else None
-        if sign is None or (last is not None and (self._listens(last) or self._is_echo(last))):
+        if sign is None or (sign.speeches and self._asks_for_nothing(sign.speeches[-1].since)):
             return inf
         if not self._scene.is_worded:
             return sign.deadline(self._config.backchannel_limit)
@@ -256,13 +255,10 @@ class Conversation:
         sign = self._sign
         if sign is None:
             return
-        heard = [(self._listens(speech.since), speech) for speech in sign.speeches]
-        interrupts = next((speech for listens, speech in heard if listens is False), None)
-        is_known = (
-            not self._scene.is_worded
-            or sign.is_wordless
-            or all(listens or self._is_echo(speech.since) for listens, speech in heard)
-        )
+        speeches = sign.speeches
+        interrupts = next((speech for speech in speeches if self._listens(speech.since) is False), None)
+        is_heard = all(self._asks_for_nothing(speech.since) for speech in speeches)
+        is_known = not self._scene.is_worded or sign.is_wordless or is_heard
         if interrupts is not None:
             self._answers(interrupts, at)
         elif sign.until is not None and is_known:
@@ -274,7 +270,8 @@ class Conversation:
             self._sign = None
         for speech in sign.speeches:
             self._tell_listening(speech, until)
-            self._echo = speech if self._is_echo(speech.since) else self._echo
+            if self._is_echo(speech.since):
+                self._echo = speech
             self._brief[speech.since] = speech.until, self._is_noise(speech.since)
         parts = [part for part in sign.parts if part.action != "speak" or not self._is_noise(part.since)]
         if all(part.action == "point" for part in parts):
@@ -325,39 +322,40 @@ class Conversation:
         They may come when its length has already decided: a "stop" was too short for an answer, and "yes, yes, okay"
         too long for a backchannel.
         """
-        in_sign = [] if self._sign is None else [each for each in self._sign.speeches if each.since == since]
-        if in_sign:
+        if (speech := self._speech_of_sign(since)) is not None:
             if self._is_echo(since):
-                self._tell_listening(in_sign[0], at)  # the robot need not wait until it is over
+                self._tell_listening(speech, at)  # the robot need not wait until it is over
             self._judge(at)
             return
-        pair, listens = self.pair, self._listens(since)
+        listens = self._listens(since)
         until, was_noise = self._brief.get(since, (None, False))
         if self._echo is not None and self._echo.since == since and says_words(self._writer.text_of(self.id, since)):
             self._was_no_echo(self._echo, at, listens=listens)
-        elif listens and (was_noise or pair.was_listening(since)):
+        elif listens and (was_noise or self.pair.was_listening(since)):
             part = SignPart("speak", since, self._speech_confidence, self._speeches.get(since))
             if part.until is None:
                 self._joins(part)
             else:
                 self._was_backchannel(ListenerSign([part]), part.until)
         elif listens is False and since in self._brief:
-            self._writer.interject(self.id, since, "interruption", at)
-            self._human_turn(since, "speak", self._speech_confidence)
             del self._brief[since]
-            if until is not None:
-                pair.ends("speak", until, by_robot=False)
+            self._was_turn(SignPart("speak", since, self._speech_confidence, until), "interruption", at)
 
     def _was_no_echo(self, part: SignPart, at: Seconds, *, listens: bool | None) -> None:
         """Take what was nothing but the robot's words for speech: the person's have come."""
-        self._echo, until = None, part.until
-        assert until is not None
+        self._echo = None
         if listens:
-            self._was_backchannel(ListenerSign([part]), until)
-            return
-        self._writer.interject(self.id, part.since, "interruption" if listens is False else "answer", at)
-        self._human_turn(part.since, "speak", part.confidence)
-        self.pair.ends("speak", until, by_robot=False)
+            assert part.until is not None
+            self._was_backchannel(ListenerSign([part]), part.until)
+        else:
+            self._was_turn(part, "interruption" if listens is False else "answer", at)
+
+    def _was_turn(self, speech: SignPart, reading: InterjectionReading, at: Seconds) -> None:
+        """Take a speech for a turn of the person that was told as something else before."""
+        self._writer.interject(self.id, speech.since, reading, at)
+        self._human_turn(speech.since, "speak", speech.confidence)
+        if speech.until is not None:
+            self.pair.ends("speak", speech.until, by_robot=False)
 
     def _is_echo(self, since: Seconds) -> bool:
         """True if nothing but the robot's own words is known of a speech."""
@@ -366,12 +364,21 @@ class Conversation:
 
     def _listens(self, since: Seconds) -> bool | None:
         """True if the words of a speech are a listener's; None: they are unknown, or not said to the robot's turn."""
-        words, event, sign = self._writer.text_of(self.id, since), self.pair.event, self._sign
-        is_sign = sign is not None and any(speech.since == since for speech in sign.speeches)
-        is_heard = (is_sign or self.robot_holds_floor) and (event is None or since >= event.started)
+        words, event = self._writer.text_of(self.id, since), self.pair.event
+        is_in_sign = self._speech_of_sign(since) is not None
+        is_heard = (is_in_sign or self.robot_holds_floor) and (event is None or since >= event.started)
         if not says_words(words) or not is_heard:
             return None
         return is_listening(words)
+
+    def _asks_for_nothing(self, since: Seconds) -> bool:
+        """True if a speech is known to be no turn: by a listener's words, or because it is the robot's own words."""
+        return bool(self._listens(since)) or self._is_echo(since)
+
+    def _speech_of_sign(self, since: Seconds) -> SignPart | None:
+        """The speech of the sign that began then; None: there is none."""
+        speeches = () if self._sign is None else self._sign.speeches
+        return next((speech for speech in speeches if speech.since == since), None)
 
     def resumes(self, event: OngoingEvent, at: Seconds) -> None:
         """Go on with a pair of a former life of recognition."""

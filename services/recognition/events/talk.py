@@ -322,14 +322,15 @@ class Talk(KindRecognizer):
         return speech.to is not None and not self._may_be_noise(speech)
 
     def _find(self, speech: OwnSpeech, face: str, at: Seconds) -> bool:
-        """Decide to whom the speech is if that is certain. face: whose face the person looks at."""
+        """Decide to whom the speech is if that is certain.
+
+        face: whose face the person looks at, if it begins in the robot's turn to them; else empty.
+        """
         company = self._scene.company(self.id)
         is_line = self._scene.lines.get(self.id) == speech.since
         to = certain(speech, company, self._scene.robot, self._scene.names, is_line=is_line)
-        if to is None and face == self._scene.robot and not self._line and self._conversation.is_spoken_to:
-            to = frozenset(
-                (face,)
-            )  # who speaks into the robot's words to them, and looks at it: it should hold at once
+        if to is None and face == self._scene.robot and not self._line:
+            to = frozenset((face,))  # into the robot's words to this person: it should hold at once
         if to is not None:
             self._address(speech, to, at)
         return to is not None
