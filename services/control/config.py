@@ -118,6 +118,11 @@ class ControlConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         return (self.body,) if isinstance(self.body, str) else self.body
 
     @property
+    def has_voice(self) -> bool:
+        """True if a voice is chosen that makes a sound."""
+        return self.voice not in ("", "silent")
+
+    @property
     def repertoire_files(self) -> tuple[str, ...]:
         """Names of the files in `repertoire`, each stronger than those before it."""
         return (self.repertoire,) if isinstance(self.repertoire, str) else self.repertoire

