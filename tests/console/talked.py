@@ -25,7 +25,7 @@ from engage_hri.services.perception.hearing.voice import RATE, Samples
 from tests.console import browser
 from tests.console.browser import Page, waited
 from tests.console.tapped import press, tap, tapped
-from tests.console.windows import engage
+from tests.console.windows import engage, hears
 from tests.perception.spoken import placed, voice, write_wav
 
 STAGE = rb"the stage[^:]*: (http://[^\s]+)"
@@ -97,14 +97,10 @@ def spoken_file(path: Path, phrases: tuple[str, ...]) -> Path:
 @asynccontextmanager
 async def at_the_stage(folder: Path, microphone: Path, *more: str) -> AsyncIterator[tuple[Page, str]]:
     """A page of `engage talk` on a phone, whose microphone is a file that is heard once. Gives its server as well."""
-    flags = (
-        "--use-fake-ui-for-media-stream", "--use-fake-device-for-media-stream",
-        f"--use-file-for-fake-audio-capture={microphone}%noloop",
-    )  # fmt: skip
     (folder / "browser").mkdir()
     with (
         engage(folder / "talk", "talk", *more, BROWSER="true %s") as talk,
-        browser.running(folder / "browser", *flags) as port,
+        browser.running(folder / "browser", *hears(microphone, once=True)) as port,
     ):
         url = waited(talk, folder / "talk", STAGE)
         async with browser.at_port(port) as running, running.page() as page:

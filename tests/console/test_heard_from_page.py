@@ -13,7 +13,6 @@ import signal
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,12 +24,10 @@ from engage_hri.schemas.perception import ActionBegan, ActionEnded, Utterance
 from engage_hri.schemas.sound import SoundFrame
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.client.robot import Robot
-from tests.bus.places import free_endpoint
 from tests.console import browser
-from tests.console.browser import Page, waited
+from tests.console.browser import Page
 from tests.console.tapped import press
-from tests.console.test_microphone_in_page import Place
-from tests.console.windows import URL, engage
+from tests.console.windows import HeardPlace, heard_place
 from tests.perception.echoes import loud
 from tests.perception.spoken import PHRASES, placed, voice, write_wav
 
@@ -48,27 +45,14 @@ FILE = placed([(number * EVERY + 0.5, voice(text)) for number, text in enumerate
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
-    folder, endpoint = tmp_path_factory.mktemp("heard"), free_endpoint()
-    (folder / "browser").mkdir()
-    path: Path = write_wav(folder / "heard.wav", FILE)
-    flags = (
-        "--use-fake-ui-for-media-stream", "--use-fake-device-for-media-stream",
-        f"--use-file-for-fake-audio-capture={path}",
-    )  # fmt: skip
+def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeardPlace]:
+    folder = tmp_path_factory.mktemp("heard")
     robot = (
-        "up", "--in-one", "--listen", endpoint, "--voice", "espeak", "--set", "control.drivers.espeak.device=none",
-        "--set", "simulation.human=none", "--set", "hearing.recognizer=sphinx",
+        "--voice", "espeak", "--set", "control.drivers.espeak.device=none", "--set", "hearing.recognizer=sphinx",
         "--set", f"hearing.phrases={json.dumps(PHRASES)}",
     )  # fmt: skip
-    window = ("console", "--connect", endpoint, "--port", "0", "--role", "wizard")
-    with (
-        engage(folder / "up", *robot) as up,
-        engage(folder / "console", *window) as console,
-        browser.running(folder / "browser", *flags) as port,
-    ):
-        waited(up, folder / "up", rb"(all services are up)")
-        yield Place(endpoint, waited(console, folder / "console", URL), port, console.pid)
+    with heard_place(folder, write_wav(folder / "heard.wav", FILE), *robot) as place:
+        yield place
 
 
 class Talk:
@@ -114,7 +98,7 @@ class Talk:
 
 
 @asynccontextmanager
-async def talking(place: Place) -> AsyncIterator[Talk]:
+async def talking(place: HeardPlace) -> AsyncIterator[Talk]:
     async with (
         browser.at_port(place.port) as running,
         running.page() as page,
@@ -149,7 +133,7 @@ async def talking(place: Place) -> AsyncIterator[Talk]:
         await page.until("!window.engage.state.you.person")
 
 
-async def test_voices_have_their_instants_and_words(place: Place) -> None:
+async def test_voices_have_their_instants_and_words(place: HeardPlace) -> None:
     async with talking(place) as talk:
         async with asyncio.timeout(3 * len(PHRASES) * EVERY):
             while sum(each.final for _, each in talk.of(Utterance)) <= len(PHRASES):
@@ -184,7 +168,7 @@ async def test_voices_have_their_instants_and_words(place: Place) -> None:
     assert sum(right) >= 0.7 * len(right)  # a piece of sound is missing where the processors stand still
 
 
-async def test_the_pair_is_answered_by_who_sits_there_with_the_words(place: Place) -> None:
+async def test_the_pair_is_answered_by_who_sits_there_with_the_words(place: HeardPlace) -> None:
     async with talking(place) as talk:
         words = []
         for _ in range(3):
@@ -197,7 +181,7 @@ async def test_the_pair_is_answered_by_who_sits_there_with_the_words(place: Plac
         assert any(words)
 
 
-async def test_a_window_that_stands_still_ends_the_speech_and_is_told(place: Place) -> None:
+async def test_a_window_that_stands_still_ends_the_speech_and_is_told(place: HeardPlace) -> None:
     async with talking(place) as talk:
         since = await talk.speaks()
         os.kill(place.process, signal.SIGSTOP)
@@ -217,7 +201,7 @@ async def test_a_window_that_stands_still_ends_the_speech_and_is_told(place: Pla
         "document.dispatchEvent(new Event('visibilitychange')); delete document.hidden",
     ],
 )
-async def test_a_microphone_that_goes_off_ends_the_speech_at_once(place: Place, how: str) -> None:
+async def test_a_microphone_that_goes_off_ends_the_speech_at_once(place: HeardPlace, how: str) -> None:
     async with talking(place) as talk:
         since = await talk.speaks()
         await talk.page.value(how)

@@ -9,7 +9,6 @@ import wave
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -19,11 +18,10 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.sound import SoundFrame
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.zenoh.hub import open_hub
-from tests.bus.places import free_endpoint
 from tests.console import browser
-from tests.console.browser import Page, waited
+from tests.console.browser import Page
 from tests.console.tapped import press
-from tests.console.windows import URL, engage
+from tests.console.windows import HeardPlace, heard_place
 
 pytestmark = [
     pytest.mark.real_time,
@@ -36,15 +34,6 @@ TONES = (0.5, 1.1, 1.5, 2.4)
 LENGTH = 3.0
 
 
-class Place(NamedTuple):
-    """A window, and a browser whose microphone hears a file."""
-
-    endpoint: str
-    url: str
-    port: int
-    process: int
-
-
 def heard_file(path: Path) -> None:
     times = np.arange(round(LENGTH * RATE)) / RATE
     tone = 0.5 * np.sin(2 * np.pi * 440 * times)
@@ -55,23 +44,11 @@ def heard_file(path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
-    folder, endpoint = tmp_path_factory.mktemp("microphone"), free_endpoint()
-    (folder / "browser").mkdir()
+def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeardPlace]:
+    folder = tmp_path_factory.mktemp("microphone")
     heard_file(folder / "heard.wav")
-    flags = (
-        "--use-fake-ui-for-media-stream", "--use-fake-device-for-media-stream",
-        f"--use-file-for-fake-audio-capture={folder / 'heard.wav'}",
-    )  # fmt: skip
-    window = ("console", "--connect", endpoint, "--port", "0", "--role", "wizard")
-    robot = ("up", "--in-one", "--listen", endpoint, "--set", "simulation.human=none")
-    with (
-        engage(folder / "up", *robot) as up,
-        engage(folder / "console", *window) as console,
-        browser.running(folder / "browser", *flags) as port,
-    ):
-        waited(up, folder / "up", rb"(all services are up)")
-        yield Place(endpoint, waited(console, folder / "console", URL), port, console.pid)
+    with heard_place(folder, folder / "heard.wav") as place:
+        yield place
 
 
 class Sitting:
@@ -112,7 +89,7 @@ class Sitting:
 
 
 @asynccontextmanager
-async def sitting(place: Place, before: str = "") -> AsyncIterator[Sitting]:
+async def sitting(place: HeardPlace, before: str = "") -> AsyncIterator[Sitting]:
     """Sit down at a page. before: a script that the page has before it loads."""
     async with (
         browser.at_port(place.port) as running,
@@ -151,7 +128,7 @@ def onsets(frames: list[tuple[float, SoundFrame]], bus: Bus) -> NDArray[np.float
     return found[np.insert(np.diff(found) > 0.15, 0, True)]
 
 
-async def test_what_the_microphone_hears_comes_to_the_bus_with_its_instants(place: Place) -> None:
+async def test_what_the_microphone_hears_comes_to_the_bus_with_its_instants(place: HeardPlace) -> None:
     async with sitting(place) as one:
         assert await one.is_off
         await one.press()
@@ -180,7 +157,7 @@ navigator.mediaDevices.getUserMedia = async (...what) => (window.stream = await 
 """
 
 
-async def test_it_is_off_at_one_press_and_the_bus_knows(place: Place) -> None:
+async def test_it_is_off_at_one_press_and_the_bus_knows(place: HeardPlace) -> None:
     async with sitting(place, KEEP) as one:
         await one.press()
         await one.is_on()
@@ -195,7 +172,7 @@ async def test_it_is_off_at_one_press_and_the_bus_knows(place: Place) -> None:
 
 
 @pytest.mark.parametrize("how", ["dispatchEvent(new Event('ended'))", "stop()"])
-async def test_a_microphone_that_is_unplugged_is_told_and_off(place: Place, how: str) -> None:
+async def test_a_microphone_that_is_unplugged_is_told_and_off(place: HeardPlace, how: str) -> None:
     async with sitting(place, KEEP) as one:
         await one.press()
         await one.is_on()
@@ -205,7 +182,7 @@ async def test_a_microphone_that_is_unplugged_is_told_and_off(place: Place, how:
         assert await one.is_off
 
 
-async def test_a_microphone_that_gives_nothing_is_told(place: Place) -> None:
+async def test_a_microphone_that_gives_nothing_is_told(place: HeardPlace) -> None:
     mute = "async () => new AudioContext().createMediaStreamDestination().stream"
     async with sitting(place, f"navigator.mediaDevices.getUserMedia = {mute};") as one:
         await one.press()
@@ -220,7 +197,7 @@ async def test_a_microphone_that_gives_nothing_is_told(place: Place) -> None:
         ("NotReadableError", "another program has it"),
     ],
 )
-async def test_a_refusal_is_told_and_can_be_asked_again(place: Place, name: str, words: str) -> None:
+async def test_a_refusal_is_told_and_can_be_asked_again(place: HeardPlace, name: str, words: str) -> None:
     refuse = f"navigator.mediaDevices.getUserMedia = async () => {{ throw new DOMException('no', '{name}'); }};"
     async with sitting(place, f"const plain = navigator.mediaDevices.getUserMedia; {refuse}") as one:
         await one.press()
@@ -231,7 +208,7 @@ async def test_a_refusal_is_told_and_can_be_asked_again(place: Place, name: str,
         await one.is_on()
 
 
-async def test_a_question_that_nobody_answers_can_be_taken_back(place: Place) -> None:
+async def test_a_question_that_nobody_answers_can_be_taken_back(place: HeardPlace) -> None:
     async with sitting(place, "navigator.mediaDevices.getUserMedia = () => new Promise(() => {});") as one:
         await one.press()
         await one.says("asks you whether")
@@ -240,7 +217,7 @@ async def test_a_question_that_nobody_answers_can_be_taken_back(place: Place) ->
         assert await one.page.value("document.querySelector('#microphone').getAttribute('aria-pressed')") == "false"
 
 
-async def test_a_page_that_is_hidden_hears_nobody_and_says_so(place: Place) -> None:
+async def test_a_page_that_is_hidden_hears_nobody_and_says_so(place: HeardPlace) -> None:
     async with sitting(place) as one:
         await one.press()
         await one.is_on()
@@ -253,7 +230,7 @@ async def test_a_page_that_is_hidden_hears_nobody_and_says_so(place: Place) -> N
         assert await one.is_off
 
 
-async def test_a_window_that_stands_still_is_told_and_what_was_lost(place: Place) -> None:
+async def test_a_window_that_stands_still_is_told_and_what_was_lost(place: HeardPlace) -> None:
     async with sitting(place) as one:
         await one.press()
         await one.is_on()
@@ -268,7 +245,7 @@ async def test_a_window_that_stands_still_is_told_and_what_was_lost(place: Place
         await one.got(count + 30)
 
 
-async def test_who_leaves_the_seat_is_heard_no_more(place: Place) -> None:
+async def test_who_leaves_the_seat_is_heard_no_more(place: HeardPlace) -> None:
     async with sitting(place) as one:
         await one.press()
         await one.is_on()

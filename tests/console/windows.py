@@ -6,6 +6,10 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
+
+from tests.bus.places import free_endpoint
+from tests.console import browser
 
 URL = rb"(http://[^\s]+)"
 """The address that a window prints."""
@@ -24,3 +28,36 @@ def engage(told: Path, *arguments: str, **settings: str) -> Iterator["subprocess
     finally:
         process.terminate()
         process.wait(30)
+
+
+class HeardPlace(NamedTuple):
+    """A window, and a browser whose microphone hears a file. process: id of the window's."""
+
+    endpoint: str
+    url: str
+    port: int
+    process: int
+
+
+def hears(file: Path, *, once: bool = False) -> tuple[str, ...]:
+    """Flags with which the microphone of a browser hears a file, again and again or once, and nobody is asked."""
+    return (
+        "--use-fake-ui-for-media-stream", "--use-fake-device-for-media-stream",
+        f"--use-file-for-fake-audio-capture={file}{'%noloop' if once else ''}",
+    )  # fmt: skip
+
+
+@contextmanager
+def heard_place(folder: Path, file: Path, *robot: str) -> Iterator[HeardPlace]:
+    """A robot without people, its window, and a browser whose microphone hears `file`. robot: options of `up`."""
+    endpoint = free_endpoint()
+    (folder / "browser").mkdir()
+    services = ("up", "--in-one", "--listen", endpoint, "--set", "simulation.human=none", *robot)
+    window = ("console", "--connect", endpoint, "--port", "0", "--role", "wizard")
+    with (
+        engage(folder / "up", *services) as up,
+        engage(folder / "console", *window) as console,
+        browser.running(folder / "browser", *hears(file)) as port,
+    ):
+        browser.waited(up, folder / "up", rb"(all services are up)")
+        yield HeardPlace(endpoint, browser.waited(console, folder / "console", URL), port, console.pid)
