@@ -16,6 +16,8 @@ from engage_hri.services.recognition.events.machine import EventWriter, Mishap, 
 from engage_hri.services.recognition.events.person import PersonRecognition
 from engage_hri.services.recognition.events.scene import SessionScene, TakenUp
 
+Step = Callable[[PersonRecognition], object]
+
 
 class People:
     """The persons of a session. strict: a bug with one raises; else it ends that person's events (see `Session`)."""
@@ -139,15 +141,15 @@ class People:
         assert at is not None
         self.apply(id, at, lambda person: person.pass_time(at))
 
-    def observe(self, id: str, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
-        """Apply a step that an observation of one person asks for; the person may be new."""
+    def observe(self, id: str, at: Seconds, step: Step, *, by_look: bool = False) -> None:
+        """Apply a step that an observation of one person asks for; the person may be new. by_look: see `_update`."""
         person = self.person(id)
-        self._apply(person, at, step)
+        self._apply(person, at, step, by_look=by_look)
         self._follow(at)
         if person.presence.here or id not in self._unseen:
             self._note(person, at)
 
-    def apply(self, id: str, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
+    def apply(self, id: str, at: Seconds, step: Step) -> None:
         """Apply a step to one person."""
         self._apply(self.persons[id], at, step)
         self._follow(at)
@@ -155,12 +157,14 @@ class People:
     def apply_to_all(
         self,
         at: Seconds,
-        step: Callable[[PersonRecognition], object],
+        step: Step,
         where: Callable[[PersonRecognition], object] = lambda person: True,
+        *,
+        by_look: bool = False,
     ) -> None:
-        """Apply a step to all who are here. where: tells for whom it may change something."""
+        """Apply a step to all who are here. where: tells for whom it may change something. by_look: see `_update`."""
         for person in [person for person in self._here.values() if where(person)]:
-            self._apply(person, at, step)
+            self._apply(person, at, step, by_look=by_look)
         self._follow(at)
 
     def _follow(self, at: Seconds) -> None:
@@ -201,29 +205,34 @@ class People:
         """Update the deadlines of those whose looks may direct the robot's now, for what all share has changed."""
         for person in list(self._here.values()):
             if person.gazes.look_directs_at < inf:
-                self._apply(person, at, lambda person: None)
+                self._apply(person, at, lambda person: None, by_look=True)
 
-    def _apply(self, person: PersonRecognition, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
-        """Apply a step to one person; a bug that shows in it does not affect the others."""
+    def _apply(self, person: PersonRecognition, at: Seconds, step: Step, *, by_look: bool = False) -> None:
+        """Apply a step to one person; a bug that shows in it does not affect the others. by_look: see `_update`."""
         try:
             step(person)
-            self._update(person)
+            self._update(person, by_look=by_look)
         except Exception as error:
             if self._strict:
                 raise
             self._writer.effects.append(Mishap(person.id, at, error))
             self.lose_track(person, at)
 
-    def _update(self, person: PersonRecognition) -> None:
-        """Note when the person is due, whether it is asked, its contact with the robot, and whether it is here."""
+    def _update(self, person: PersonRecognition, *, by_look: bool = False) -> None:
+        """Note when the person is due, whether it is asked, its contact with the robot, and whether it is here.
+
+        by_look: nothing but looks and presence has changed.
+        """
         id, scene, presence = person.id, self._scene, person.presence
-        is_asked = person.talk.is_asked
-        if is_asked or id in scene.asked:
-            self._asks(person, is_asked=is_asked)
-        if (since := person.talk.undecided_since) is not None:
-            scene.unknown[id] = since
-        elif scene.unknown:
-            scene.unknown.pop(id, None)
+        if not by_look:
+            is_asked = person.talk.is_asked
+            if is_asked or id in scene.asked:
+                self._asks(person, is_asked=is_asked)
+            if (since := person.talk.undecided_since) is not None:
+                scene.unknown[id] = since
+            elif scene.unknown:
+                scene.unknown.pop(id, None)
+        person.note_deadlines(by_look=by_look)
         self.agenda.set(id, None if (due := person.deadline) == inf else due)
         if (contact := person.contact) != self._contacts.get(id):
             self._contacts[id] = self._new_contacts[id] = contact

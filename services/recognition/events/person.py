@@ -56,9 +56,13 @@ class PersonRecognition:
             kind: shared.get(kind) or own_recognizer(kind)(id, scene, config, writer) for kind in EVENT_KINDS
         }
         self._recognizers = tuple(dict.fromkeys(self._by_kind.values()))
+        self._others = tuple(each for each in self._recognizers if each is not self.gazes)
+        """Recognizers of which looks are no part."""
         self.history = ActionHistory(ACTIONS_KEPT)
         self._doing: dict[Action, _Doing] = {}
         """Present actions other than looking."""
+        self._looks_due = self._others_due = inf
+        """Times of the next steps due by themselves: of presence and looks, and of all the rest."""
         self._scene = scene
 
     @property
@@ -71,16 +75,27 @@ class PersonRecognition:
     @property
     def deadline(self) -> Seconds:
         """Time of the next step that is due by itself, unless an input comes before; then call `pass_time`."""
+        looks, others = self._looks_due, self._others_due
+        return looks if looks < others else others
+
+    def note_deadlines(self, *, by_look: bool) -> None:
+        """Note when steps are due, after an input. by_look: nothing but looks and presence has changed.
+
+        Most of what people do is looking about, and asks for nothing else.
+        """
         due, gaze = self.presence.deadline, self.gazes.gaze
         if gaze.targets:
             due = min(due, self.gazes.look_directs_at if gaze.ended == inf else gaze.deadline)
-        for each in self._recognizers:
-            if (at := each.deadline) < due:
-                due = at
-        for doing in self._doing.values():
-            if doing.until < due:
-                due = doing.until
-        return due
+        self._looks_due = min(due, self.gazes.deadline)
+        if not by_look:
+            due = inf
+            for each in self._others:
+                if (at := each.deadline) < due:
+                    due = at
+            for doing in self._doing.values():
+                if doing.until < due:
+                    due = doing.until
+            self._others_due = due
 
     @property
     def is_involved(self) -> bool:

@@ -164,13 +164,15 @@ class Session:
         if began.actor == self.robot:
             self._robot_begins(began, at)
         else:
-            self._people.observe(began.actor, at, lambda person: person.begins(began, at))
+            by_look = began.action == "look"
+            self._people.observe(began.actor, at, lambda person: person.begins(began, at), by_look=by_look)
 
     def _ends(self, ended: ActionEnded, at: Seconds) -> None:
         if ended.actor == self.robot:
             self._robot_ends(ended, at)
         elif ended.actor in self.persons:
-            self._people.observe(ended.actor, at, lambda person: person.ends(ended, at))
+            by_look = ended.action == "look"
+            self._people.observe(ended.actor, at, lambda person: person.ends(ended, at), by_look=by_look)
 
     def _goes_on(self, observation: GoesOn, at: Seconds) -> None:
         began, since = observation.began, observation.since
@@ -189,12 +191,12 @@ class Session:
 
     def _hands_changed(self, covered: Covered, at: Seconds) -> None:
         self.scene.covered = covered
-        self._people.apply_to_all(at, lambda person: person.gazes.hands_changed())
+        self._people.apply_to_all(at, lambda person: person.gazes.hands_changed(), by_look=True)
 
     def _head_owner_changed(self, head: HeadOwner, at: Seconds) -> None:
         self.scene.head_owner = head.owner
         self._people.apply_to_all(
-            at, lambda person: person.gazes.head_owner_changed(at), lambda person: person.gazes.is_under_way
+            at, lambda person: person.gazes.head_owner_changed(at), lambda person: person.gazes.is_under_way, by_look=True
         )
 
     def resume(self, former: ConnectionEvent, at: Seconds) -> list[Effect]:
@@ -375,7 +377,7 @@ class Session:
 
     def _robot_gaze_changed(self, at: Seconds) -> None:
         self._people.apply_to_all(
-            at, lambda person: person.gazes.gaze_changed(at), lambda person: person.gazes.is_under_way
+            at, lambda person: person.gazes.gaze_changed(at), lambda person: person.gazes.is_under_way, by_look=True
         )
 
     # -- requests -----------------------------------------------------------------------------------------------
