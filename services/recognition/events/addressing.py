@@ -108,6 +108,8 @@ def named(words: str, names: Mapping[str, str]) -> Addressees:
     middle, and at the end of a sentence, it may be what the sentence is about.
     """
     said = [word for word in words.split() if any(map(str.isalnum, word))]
+    if not said:
+        return NOBODY
     lengths = range(1 + max((name.count(" ") for name in names), default=0), 0, -1)
     calls = [said[:length] for length in lengths if _plain(said[:length]) in names][:1]
     after = len(calls[0]) if calls else 1
@@ -151,11 +153,9 @@ def likely(
     """
     if face := speech.faces.most(speech.since):
         return frozenset((face,))
-    said = [each for each in spoken if not each.is_noise]
-    recent = [each for each in said if each.is_just_before(speech.since, within)]
-    last = max(
-        (each for each in recent if speech.actor == each.actor or each.is_to(speech.actor)), key=_since, default=None
-    )
+    actor, since = speech.actor, speech.since
+    heard = [each for each in spoken if (each.actor == actor or each.is_to(actor)) and not each.is_noise]
+    last = max((each for each in heard if each.is_just_before(since, within)), key=_since, default=None)
     if last is None:
         return awaited_by
     if last.actor != speech.actor:

@@ -10,6 +10,8 @@ from engage_hri.services.recognition.events.presence import NEVER
 Key = TypeVar("Key")
 Value = TypeVar("Value")
 
+NEVER_PERFORMED = (NEVER, NEVER)
+
 
 class Latest(dict[Key, Value]):
     """A dict that keeps only the `size` entries that were set last."""
@@ -30,13 +32,20 @@ class ActionHistory:
     """Times at which the actions of one actor last began and ended, for the `kept` latest of them."""
 
     def __init__(self, kept: int) -> None:
-        self._performed: Latest[tuple[Action, str, tuple[str, ...]], tuple[Seconds, Seconds]] = Latest(kept)
+        self._kept = kept
+        self._performed: dict[tuple[Action, str, tuple[str, ...]], tuple[Seconds, Seconds]] = {}
+        """The one that was reported last comes last."""
 
     def is_new(self, action: ActionBegan | ActionEnded, at: Seconds) -> bool:
         """True unless the report repeats an earlier one, or comes after a newer report of the same action."""
-        key = (action.action, action.behavior, action.targets)
-        began, ended = self._performed.pop(key, (NEVER, NEVER))
-        begins = isinstance(action, ActionBegan)
-        is_new = at > began and at >= ended if begins else at > ended and at >= began
-        self._performed[key] = (began, ended) if not is_new else (at, ended) if begins else (began, at)
+        performed, key = self._performed, (action.action, action.behavior, action.targets)
+        before = began, ended = performed.pop(key, NEVER_PERFORMED)
+        if len(performed) == self._kept:
+            del performed[next(iter(performed))]
+        if isinstance(action, ActionBegan):
+            is_new = at > began and at >= ended
+            performed[key] = (at, ended) if is_new else before
+        else:
+            is_new = at > ended and at >= began
+            performed[key] = (began, at) if is_new else before
         return is_new

@@ -26,8 +26,8 @@ class People:
         self.persons: dict[str, PersonRecognition] = {}
         self._here: dict[str, PersonRecognition] = {}
         """Persons who are here, in the order of acquaintance."""
-        self.agenda: Deadlines[str] = Deadlines(lambda id: self.persons[id].number)
-        """Times at which the persons are due."""
+        self.agenda: Deadlines[str] = Deadlines(lambda id: self.persons[id].number if id in self.persons else 0)
+        """Times at which the persons are due, and the robot, who comes first."""
         self._unseen: dict[str, Seconds] = {}
         """Time of the last sign of each person who has gone or is not reported as present. The longest ago first."""
         self._met = 0
@@ -135,7 +135,7 @@ class People:
     # -- steps ---------------------------------------------------------------------------------------------
 
     def advance(self) -> None:
-        """Take the step that is due first."""
+        """Take the step that is due first, of a person."""
         id, at = self.agenda.first, self.agenda.earliest
         assert id is not None
         assert at is not None
@@ -232,8 +232,8 @@ class People:
                 scene.unknown[id] = since
             elif scene.unknown:
                 scene.unknown.pop(id, None)
-        person.note_deadlines(by_look=by_look)
-        self.agenda.set(id, None if (due := person.deadline) == inf else due)
+        due = person.note_deadlines(by_look=by_look)
+        self.agenda.set(id, None if due == inf else due)
         if (contact := person.contact) != self._contacts.get(id):
             self._contacts[id] = self._new_contacts[id] = contact
         if presence.here is not (id in self._here) or presence.reported is not (id in scene.found):

@@ -78,8 +78,8 @@ class PersonRecognition:
         looks, others = self._looks_due, self._others_due
         return looks if looks < others else others
 
-    def note_deadlines(self, *, by_look: bool) -> None:
-        """Note when steps are due, after an input. by_look: nothing but looks and presence has changed.
+    def note_deadlines(self, *, by_look: bool) -> Seconds:
+        """Note when steps are due, after an input; return the `deadline`. by_look: only looks and presence changed.
 
         Most of what people do is looking about, and asks for nothing else.
         """
@@ -96,6 +96,7 @@ class PersonRecognition:
                 if doing.until < due:
                     due = doing.until
             self._others_due = due
+        return self.deadline
 
     @property
     def is_involved(self) -> bool:

@@ -30,7 +30,7 @@ from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING,
 from engage_hri.services.recognition.events.machine import Effect, EventWriter, Mishap, OngoingEvent
 from engage_hri.services.recognition.events.people import People
 from engage_hri.services.recognition.events.person import PersonRecognition
-from engage_hri.services.recognition.events.scene import SAME_INSTANT, Covered, SessionScene, Worded
+from engage_hri.services.recognition.events.scene import Covered, SessionScene, Worded
 from engage_hri.services.recognition.events.talk import Step
 from engage_hri.services.reports.ongoing_actions import GoesOn
 
@@ -70,6 +70,7 @@ class Session:
         self._config = config
         self._writer = EventWriter(clock, name, words_patience=WORDS_PATIENCE)
         self._people = People(self.scene, config, self._writer, strict=strict)
+        self._agenda = self._people.agenda
         self._ended_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
         self._aborted_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
         self._robot_actions: dict[tuple[str, Action], ActionBegan] = {}
@@ -128,34 +129,30 @@ class Session:
     @property
     def deadline(self) -> Seconds | None:
         """Time at which `advance` has something to do, unless an observation comes first."""
-        due = self._due
+        due = self._agenda.look
         return None if due == inf else due
-
-    @property
-    def _due(self) -> Seconds:
-        """The deadline; infinite: there is none."""
-        people, gaze = self._people.agenda.look, self.scene.gaze.ended + SAME_INSTANT
-        return people if people < gaze else gaze
 
     def advance(self, now: Seconds) -> list[Effect]:
         """Take all steps that are due up to and including `now`."""
-        while (due := self._due) <= now:
-            self._take_step(due)
+        while self._agenda.look <= now:
+            self._take_step()
         self._people.forget(now)
         return self._take()
 
-    def _take_step(self, due: Seconds) -> None:
-        if due == self.scene.gaze.ended + SAME_INSTANT:
-            self._robot_gaze_changed(self.scene.gaze.expire())
-        else:
+    def _take_step(self) -> None:
+        """Take the step that is due first: a person's, or the end of the robot's look."""
+        if self._agenda.first != self.robot:
             self._people.advance()
+        else:
+            self._agenda.clear(self.robot)
+            self._robot_gaze_changed(self.scene.gaze.expire())
 
     # -- observations -------------------------------------------------------------------------------------------
 
     def feed(self, observation: Observation | Covered, at: Seconds) -> list[Effect]:
         """Take an observation of what happened at `at`. Slightly late or repeated ones are put right or ignored."""
-        while (due := self._due) < at - ROUNDING:
-            self._take_step(due)
+        while self._agenda.look < at - ROUNDING:
+            self._take_step()
         self._people.forget(at)
         self._takes[type(observation)](observation, at)
         return self._take()
@@ -196,7 +193,7 @@ class Session:
     def _head_owner_changed(self, head: HeadOwner, at: Seconds) -> None:
         self.scene.head_owner = head.owner
         self._people.apply_to_all(
-            at, lambda person: person.gazes.head_owner_changed(at), lambda person: person.gazes.is_under_way, by_look=True
+            at, lambda person: person.gazes.head_owner_changed(at), _has_gaze_under_way, by_look=True
         )
 
     def resume(self, former: ConnectionEvent, at: Seconds) -> list[Effect]:
@@ -254,8 +251,7 @@ class Session:
         if not self._history.is_new(began, at):
             return
         if began.action == "look":
-            if self.scene.gaze.begin(began.targets, at):
-                self._robot_gaze_changed(at)
+            self._robot_looks(began.targets, at)
             return
         self._robot_actions[began.behavior, began.action] = began
         match began.action:
@@ -309,9 +305,7 @@ class Session:
         if began.action == "look":
             if self.scene.gaze.targets and since < self.scene.gaze.since:
                 return  # there is a newer one
-            since = max(since, self.scene.gaze.since)
-            if self.scene.gaze.begin(began.targets, since):
-                self._robot_gaze_changed(since)
+            self._robot_looks(began.targets, max(since, self.scene.gaze.since))
             return
         self._robot_actions[began.behavior, began.action] = began
         if began.action == "speak" and self.scene.robot_speaks_since is None:
@@ -326,6 +320,7 @@ class Session:
         self._robot_actions.pop((ended.behavior, action), None)
         if action == "look":
             self.scene.gaze.end(ended.targets, at)
+            self._note_robot_gaze()
             return
         if action == "speak":
             if self.scene.robot_speaks_since is None or any(each == "speak" for _, each in self._robot_actions):
@@ -375,10 +370,19 @@ class Session:
                 )
                 self._robot_ends(ended, at)
 
+    def _robot_looks(self, targets: tuple[str, ...], at: Seconds) -> None:
+        is_change = self.scene.gaze.begin(targets, at)
+        self._note_robot_gaze()
+        if is_change:
+            self._robot_gaze_changed(at)
+
+    def _note_robot_gaze(self) -> None:
+        """Note when the robot's look is over, unless the same look begins again."""
+        due = self.scene.gaze.deadline
+        self._agenda.set(self.robot, None if due == inf else due)
+
     def _robot_gaze_changed(self, at: Seconds) -> None:
-        self._people.apply_to_all(
-            at, lambda person: person.gazes.gaze_changed(at), lambda person: person.gazes.is_under_way, by_look=True
-        )
+        self._people.apply_to_all(at, lambda person: person.gazes.gaze_changed(at), _has_gaze_under_way, by_look=True)
 
     # -- requests -----------------------------------------------------------------------------------------------
 
@@ -575,3 +579,7 @@ class Session:
         answered = self._answering_blocks.pop(block, None)
         if answered is not None:
             self._tell(answered, at, lambda talk: talk.pair.answered_block_ended(at))
+
+
+def _has_gaze_under_way(person: PersonRecognition) -> bool:
+    return person.gazes.is_under_way

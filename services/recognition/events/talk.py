@@ -123,7 +123,7 @@ class Talk(KindRecognizer):
 
     def looks_at(self, face: str, at: Seconds) -> None:
         """Take a look at a face, or away from all ("")."""
-        for speech in self._undecided:
+        for speech in self._undecided if self._line else ():
             if speech.until is None:
                 speech.faces.turns(face, at)
 
