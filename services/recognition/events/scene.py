@@ -156,8 +156,8 @@ class SessionScene:
         """The latest speeches whose addressees are known, of all."""
         self.questions: dict[str, Question] = {}
         """Questions of the robot that wait for an answer, by the person who was asked."""
-        self.asked: set[str] = set()
-        """People who were asked, as far as is known: they may have answered already."""
+        self.asked: dict[str, Seconds] = {}
+        """Since when people are asked, as far as is known: they may have answered already."""
         self.taken_up: list[TakenUp] = []
         """Answers to them by somebody else, which the person who was asked has yet to be told of."""
         self.unknown: dict[str, Seconds] = {}
@@ -278,7 +278,7 @@ class SessionScene:
 
     def place(self, person: str, at: Seconds) -> tuple[Seconds, bool, str]:
         """Place of what a person begins to say in the order in which people are heard: who is asked comes first."""
-        return at, person not in self.asked, person
+        return at, self.asked.get(person, inf) >= at, person
 
     def may_be_answered(self, person: str, until: Seconds) -> bool:
         """True if somebody else has begun to speak by then, of whom it is not known yet to whom it is."""

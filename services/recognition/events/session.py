@@ -24,7 +24,7 @@ from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.addressing import NOBODY, WHOEVER, WORDS_AFTER, Addressees, Spoken
-from engage_hri.services.recognition.events.conversation import TURN_PATIENCE
+from engage_hri.services.recognition.events.exchange import TURN_PATIENCE
 from engage_hri.services.recognition.events.history import ActionHistory, Latest
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock, anchor
 from engage_hri.services.recognition.events.machine import Effect, EventWriter, Mishap, OngoingEvent
