@@ -241,7 +241,7 @@ words that end just before the robot's, and are known after these, answer
     robot bc: started 2.4, succeeded 2.4, completed 2.4
 
 ... but nothing of either if the robot has spoken to them since
-    0 ann said 0; 1 robot asks ann 1; 1 bob looks robot; 1.5 bob speaks 0.3; 4 robot asks bob 1; 6 bob said 1.5; 30 end
+    0 ann said 0; 1 robot asks ann 1; 1 bob looks robot; 1.5 bob speaks 0.3; 4 robot asks bob 1; 6 bob said 1.5; 9 end
     robot: started 1, failed 6
     robot: started 4, failed 9
 
@@ -250,7 +250,7 @@ noise in the robot's turn is the answer if its words come after the turn
     robot: started 1, succeeded 4 after -1, completed 4
 
 a nod beside a listener's words that come late is one backchannel with them
-    0 ann said 0; 1 robot asks ann 9; 1 ann looks robot; 2 ann nods 0.4; 2 ann speaks 0.4; 6 ann said 2 words=hm; 30 end
+    0 ann said 0; 1 robot asks ann 9; 2 ann nods 0.4; 2 ann speaks 0.4; 6 ann said 2 words=hm; 9 end
     robot: started 1, failed 14
     robot bc: started 2.4, succeeded 2.4, completed 2.4
 

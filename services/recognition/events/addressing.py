@@ -56,6 +56,11 @@ class Spoken(Struct, kw_only=True):
     is_noise: bool = False
     """True if no words have come of it."""
 
+    @property
+    def named(self) -> Addressees:
+        """Ids of the addressees, as far as they are known."""
+        return NOBODY if self.to is None or self.to is WHOEVER else self.to
+
     def is_to(self, actor: str) -> bool:
         return self.to is WHOEVER or (self.to is not None and actor in self.to)
 

@@ -18,6 +18,9 @@ from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, in_time
 LINES_KEPT = 256
 SPOKEN_KEPT = 32
 """Number of speeches of all that are remembered with their addressees."""
+ENDED_TOLD = 4
+"""Number of speeches that are told once more when they are over: as many may end before it is known to whom the first
+was. Ours."""
 TOLD_MARGIN: Seconds = 0.1
 """Difference of the beginnings of a speech and of words that are told just before it. Ours."""
 SAME_INSTANT: Seconds = 0.001
@@ -239,6 +242,11 @@ class SessionScene:
         self.floor_changes += 1
         if not any(each is spoken for each in self.spoken):
             self.spoken.append(spoken)
+
+    def ended(self) -> list[Spoken]:
+        """The speeches that were over last of those with known addressees, in the order of their ends."""
+        over = [(each.until, each.since, each) for each in self.spoken if each.until is not None and each.named]
+        return [each for _, _, each in sorted(over, key=lambda one: one[:2])[-ENDED_TOLD:]]
 
     @property
     def robot_speaks_since(self) -> Seconds | None:

@@ -48,25 +48,15 @@ class Talk(KindRecognizer):
         """What is not told yet, with its times. The first is a speech of which it is not known to whom it is."""
         self._asked_in_line: Seconds = inf
         """Start of the first turn of the robot that is in line; infinite: none is."""
-        self._speech: OwnSpeech | None = None
+        self.speech: OwnSpeech | None = None
         """The speech of the person that goes on."""
         self._noises: Latest[Seconds, OwnSpeech] = Latest(NOISES_KEPT)
         """The latest sounds of which no words have come, by their starts."""
 
     @property
-    def speaks_since(self) -> Seconds | None:
-        """Time when the person began what they say now; None: they are silent."""
-        return None if self._speech is None else self._speech.since
-
-    @property
-    def speaks_to(self) -> Addressees:
-        """Addressees of the speech that goes on; empty: they are not known, or there is none."""
-        return NOBODY if self._speech is None or self._speech.to is None else self._speech.to
-
-    @property
     def is_in_contact(self) -> bool:
         """True while the person says something that is known to be for the robot."""
-        return self._speech is not None and self._speech.is_to(self._scene.robot)
+        return self.speech is not None and self.speech.is_to(self._scene.robot)
 
     @property
     def takes_floor_since(self) -> Seconds:
@@ -146,7 +136,7 @@ class Talk(KindRecognizer):
 
     def _speaks(self, at: Seconds, confidence: Probability, face: str) -> None:
         """Take the beginning of a speech. face: whose face the person looks at."""
-        self._speech = speech = self._own_speech(at, confidence, face)
+        self.speech = speech = self._own_speech(at, confidence, face)
         speech.told, speech.words = self._scene.told_to(self.id, at), self._writer.text_of(self.id, at)
         # What waits in line may be the robot's own turn, so that only the scene knows that it has begun.
         said = self._scene.robot_spoken
@@ -166,7 +156,7 @@ class Talk(KindRecognizer):
 
     def _falls_silent(self, at: Seconds) -> None:
         """Take the end of the speech that goes on."""
-        speech, self._speech = self._speech, None
+        speech, self.speech = self.speech, None
         if speech is None:
             return
         speech.until = at
@@ -187,7 +177,7 @@ class Talk(KindRecognizer):
     def goes_on(self, action: Action, since: Seconds, at: Seconds, confidence: Probability, face: str) -> None:
         """Take an action that goes on, known only now, at `at`. It has been decided by the looks of now to whom."""
         if action == "speak":
-            self._speech = speech = self._own_speech(since, confidence, face)
+            self.speech = speech = self._own_speech(since, confidence, face)
             if not self._find(speech, face, at):
                 self._likely(speech, at)
             if not speech.is_to(self._scene.robot):
@@ -219,9 +209,9 @@ class Talk(KindRecognizer):
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         """Take the person's leaving: nothing waits any longer."""
-        if self._speech is not None and self._speech.until is None:
-            self._speech.until = until
-        self._speech = None
+        if self.speech is not None and self.speech.until is None:
+            self.speech.until = until
+        self.speech = None
         self._noises.clear()
         for speech in self._undecided:
             self._decide(speech, at)
