@@ -107,11 +107,15 @@ def test_a_name_of_two_words_calls_one_person(words: str) -> None:
         ("mary ann", {"mary ann"}),
         ("I have told Mary Ann", set()),
         ("Look, Ann", {"ann"}),
+        ("マリ、見て", {"マリ"}),
+        ("赤いのを取って、マリ。", {"マリ"}),
+        ("赤いのを取って。でも、これもいい。それはマリ", set()),
+        ("看，那个红的，在那里，马力。", {"马力"}),
         ("", set()),
     ],
 )  # fmt: skip
 def test_words_call_whom_they_name(words: str, called: set[str]) -> None:
-    assert named(words, {name: name for name in ("mary", "ann", "mary ann")}) == called
+    assert named(words, {name: name for name in ("mary", "ann", "mary ann", "マリ", "马力")}) == called
 
 
 def test_without_names_nobody_is_called() -> None:
