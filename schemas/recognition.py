@@ -123,21 +123,28 @@ class Interjection(Struct, frozen=True, kw_only=True, tag="interjection", omit_d
 
 
 class FloorSpeech(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """A speech that goes on. actor: who speaks. to: ids of its addressees; empty: they are not known yet."""
+    """A speech. actor: who speaks. to: ids of its addressees; empty: they are not known yet.
+
+    until: None: it goes on.
+    """
 
     actor: str
     since: Stamp
     to: tuple[str, ...] = ()
+    until: Stamp | None = None
 
 
 class Floor(Struct, frozen=True, kw_only=True, tag="floor", omit_defaults=True):
     """state: recognition. Who has the floor.
 
     at: the instant of the last change. speeches: all that go on, the first first; the others overlap it.
+    ended: the last four that are over and of which it is known to whom they were, in the order of their ends. Of a
+    short speech that is known only when it is over.
     """
 
     at: Stamp
     speeches: tuple[FloorSpeech, ...] = ()
+    ended: tuple[FloorSpeech, ...] = ()
 
 
 class SamePerson(Struct, frozen=True, kw_only=True, omit_defaults=True):

@@ -355,17 +355,25 @@ class Intake:
         self._clock_errors.heard(actor, at, self._clock.error(stamp.clock) if is_sure else inf)
 
     def _tell_floor(self) -> None:
-        """Tell who speaks, if that has changed."""
+        """Tell who speaks, and to whom, if that has changed."""
         session, name = self._recognizer.session, self._clock.name
         if session.scene.floor_changes == self._floor_changes:
             return
         self._floor_changes = session.scene.floor_changes
-        told = [
-            FloorSpeech(actor=who, since=Stamp(name, at), to=tuple(sorted(to))) for who, at, to in session.floor()
-        ]
-        told = [self._identities.outward(each) for each in told]
-        floor = Floor(at=Stamp(name, self._now), speeches=tuple(told))
-        if floor.speeches != self._floor.speeches:
+        told, ended = (
+            tuple(
+                self._identities.outward(
+                    FloorSpeech(
+                        actor=each.actor, since=Stamp(name, each.since), to=tuple(sorted(each.named)),
+                        until=None if each.until is None else Stamp(name, each.until),
+                    )
+                )
+                for each in speeches
+            )
+            for speeches in (session.floor(), session.scene.ended())
+        )  # fmt: skip
+        floor = Floor(at=Stamp(name, self._now), speeches=told, ended=ended)
+        if (told, ended) != (self._floor.speeches, self._floor.ended):
             self._floor = floor
             self._outputs.append(PublishMessage(keys.FLOOR, floor))
 

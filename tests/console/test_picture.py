@@ -171,6 +171,8 @@ def test_speeches_overlap_and_say_for_whom_they_are_and_what_those_into_the_turn
     robot = FloorSpeech(actor="robot", since=at(11.0), to=("ann",))
     ann, ben = FloorSpeech(actor="ann", since=at(12.0)), FloorSpeech(actor="ben", since=at(12.5))
 
+    over = replace(ann, to=("robot",), until=at(12.7))
+
     def taken(reading: InterjectionReading, time: Seconds, words: str = "") -> Timed:
         return Interjection(actor="ann", since=at(12.0), at=at(time), reading=reading, words=words), time
 
@@ -182,15 +184,16 @@ def test_speeches_overlap_and_say_for_whom_they_are_and_what_those_into_the_turn
         (Floor(at=at(12.8), speeches=(robot, ben)), 12.8),
         taken("backchannel", 13.0, "uh-huh"),
         (Floor(at=at(13.5), speeches=(replace(ben, to=("ann",)),)), 13.5),
+        (Floor(at=at(13.6), speeches=(replace(ben, to=("ann",)),), ended=(over,)), 13.6),
     )
 
     assert section(made, "floor") == [
         shown("robot", 1.0, 3.5, to=["ann"]),
-        shown("ann", 2.0, 2.8, taken="as a listener", words="uh-huh"),
+        shown("ann", 2.0, 2.7, to=["robot"], taken="as a listener", words="uh-huh"),
         shown("ben", 2.5, None, to=["ann"]),
     ]
     made.feed(PeerGone(participant="recognition"), 15.0, 15.0)
-    assert [each["until"] for each in section(made, "floor")] == [3.5, 2.8, 5.0]
+    assert [each["until"] for each in section(made, "floor")] == [3.5, 2.7, 5.0]
 
 
 def shown(actor: str, since: float, until: float | None, **fields: object) -> dict[str, object]:

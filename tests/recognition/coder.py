@@ -18,6 +18,7 @@ from tests.recognition.timeline import LIMIT, LISTENING, Absence, Drawing, Insta
 BRIEF = 0.8
 """Longest speech of a listener whose words nobody tells."""
 WORDS_WAIT = 1.5
+WORDS_AFTER = 1.0
 LONGEST_SOUND = 3.0
 """Longest sound without words that may be none; where perception tells addressees, the words come late."""
 LONGEST_SOUND_TOLD = 15.0
@@ -98,13 +99,15 @@ class Coder:
     def _in_order(self, acts: list[Span | Turn | Absence]) -> Iterator[Span | Turn | Absence]:
         """All that happens, as it comes: of several who begin to speak at one time, who was asked is heard first.
 
-        Unless it is known at once to whom each speaks: then who is observed first is.
+        Unless it is known at once what each says, and to whom: into the robot's words, where perception tells it.
         """
         for _, together in groupby(sorted(acts, key=_known), key=lambda act: _known(act)[0]):
             yield from sorted(together, key=self._is_of_another)
 
     def _is_of_another(self, act: Span | Turn | Absence) -> tuple[bool, bool]:
-        if len(self._sides) == 1 or self._timeline.tells == "early":
+        speech = [each for turn in self._timeline.turns for each in turn.speech]
+        is_known = self._timeline.tells == "early" and any(since < _known(act) < until for since, until in speech)
+        if len(self._sides) == 1 or is_known:
             return False, False
         return isinstance(act, Absence), isinstance(act, Span) and self._sides[act.who].asked is None
 
@@ -188,13 +191,16 @@ class Coder:
             goes_on = [
                 each for each in sign if each.until > turn.until and (each.action == "speak" or may_be_answered)
             ]  # fmt: skip
-            interrupts = [each for each in sign if each.action == "speak" and self._interrupts(each, turn)]
-            answers = sorted([*goes_on, *interrupts], key=lambda each: each.since)
             following = sets[number + 1][0].since if number + 1 < len(sets) else (1e9, 0)
             over = max(each.until for each in every if sign[0].since <= each.since <= sign[-1].until)
             late = [each for each in sign if self._is_told_late(each, following)]
             is_brief = any(over < each.known for each in late if each.known is not None) and not goes_on
             parts = [each for each in sign if each not in late and self._shows(each)]
+            interrupts = [
+                each for each in sign
+                if each.action == "speak" and self._interrupts(each, turn, is_noise=not parts)
+            ]  # fmt: skip
+            answers = sorted([*goes_on, *interrupts], key=lambda each: each.since)
             if any(each.action == "speak" for each in answers) or (answers and not found):
                 found.append(answers[0])
                 is_listening = is_brief
@@ -202,8 +208,9 @@ class Coder:
                 is_listening = not (found and any(each.seconds > WORDS_WAIT + ROUND for each in sign))
             if is_listening and parts:
                 self._note("backchannel", ROBOT, side.person, parts[0].since[0], "completed")
-            for each in late:
-                if each.words in LISTENING and each.known is not None and each.known < turn.until:
+                continue  # one sign gives one, also if words of it come later
+            for each in late if not answers else ():
+                if each.words in LISTENING and (self._is_known_in(each, turn) or self._is_last(each)):
                     self._note("backchannel", ROBOT, side.person, each.since[0], "completed")
         return found
 
@@ -216,24 +223,46 @@ class Coder:
                 and since < each.since < until
             ]  # fmt: skip
             for speech in beside:
-                sign = [speech] + [
+                sign = [
                     each for each in self._timeline.spans
                     if each.who == side.person and speech.since < each.since < speech.until
                     and each.action not in ("speak", "look")
                 ]  # fmt: skip
-                self._used |= set(map(id, sign))
+                self._used |= {id(speech), *map(id, sign)}
+                sign = [each for each in sign if self._is_shown_to_robot(side, each)]
+                heard = max(speech.since[0] + WORDS_WAIT, speech.until[0] + WORDS_AFTER)
+                is_in_time = speech.known is not None and speech.known[0] <= heard + ROUND
+                is_known = self._is_last(speech) and (is_in_time or not any(map(self._shows, sign)))
+                is_noise = self._timeline.is_worded and not is_known
                 shown = sorted(each.since for each in sign if self._shows(each))
+                shown = shown if is_noise else [speech.since]
                 is_brief = speech.seconds <= (self._longest_sound if self._timeline.is_worded else BRIEF) + ROUND
-                takes_floor = not is_brief if speech.known is None else speech.words not in LISTENING
+                takes_floor = speech.words not in LISTENING if is_known else not is_brief
                 if speech.until > until or takes_floor:
                     self._turns.add(id(speech))
                 elif shown:
                     self._note("backchannel", ROBOT, side.person, shown[0][0], "completed")
 
+    def _is_shown_to_robot(self, side: Side, sign: Span) -> bool:
+        """True if a gesture is for the robot: of who was not asked it is only if the head says so."""
+        looks = [each for each in self._timeline.spans if each.who == sign.who and each.action == "look"]
+        is_seen = any(each.since < sign.since < each.until and each.to == ROBOT for each in looks)
+        return is_seen or side.asked is not None or len(self._sides) == 1
+
+    def _is_last(self, speech: Span) -> bool:
+        """True if words come of a speech, and neither the person nor the robot to them has spoken before they do."""
+        if speech.known is None:
+            return False
+        own = [each.since for each in self._timeline.spans if _speaks_to_robot(each, speech.who)]
+        robots = [since for turn in self._timeline.turns if turn.to == speech.who for since, _ in turn.speech]
+        return not any(speech.since < since < speech.known for since in (*own, *robots))
+
     def _is_listening(self, side: Side, turn: Turn) -> bool:
         """True if the robot says a little while the person speaks, and has nothing to answer."""
-        speech = [each for each in self._timeline.spans if each.who == side.person and each.action == "speak"]
-        beside = any(each.to == ROBOT and each.since < turn.since and turn.until < each.until for each in speech)
+        speech = [each for each in self._timeline.spans if _speaks_to_robot(each, side.person)]
+        beside = any(
+            each.since < turn.since and turn.until < each.until and not self._is_noise(each) for each in speech
+        )
         return beside and turn.until[0] - turn.since[0] <= BRIEF + ROUND
 
     def _without_late(self, signs: list[Span], turn: Turn) -> list[Span]:
@@ -261,7 +290,10 @@ class Coder:
     def _goes_with_words(self, sign: Span, turn: Turn) -> bool:
         """True for a gesture beside the person's own words, if these are no listener's: it says nothing more."""
         beside = self._words_beside(sign)
-        own = [each for each in beside if each.since < turn.since or self._interrupts(each, turn)]
+        own = [
+            each for each in beside
+            if each.since < turn.since or (self._interrupts(each, turn) and not self._is_told_late(each, (1e9, 0)))
+        ]  # fmt: skip
         return sign.action != "speak" and bool(own)
 
     def _words_beside(self, sign: Span) -> list[Span]:
@@ -285,14 +317,23 @@ class Coder:
 
     def _is_decided(self, answer: Span, turn: Turn) -> bool:
         """True if it is known before the end of the robot's words that somebody has interrupted them."""
-        return answer.action == "speak" and min(answer.until[0], answer.since[0] + BRIEF) < turn.until[0] - ROUND
+        decided = min(answer.until[0], answer.since[0] + (WORDS_WAIT if self._timeline.is_worded else BRIEF))
+        return answer.action == "speak" and decided < turn.until[0] - ROUND
 
-    def _interrupts(self, speech: Span, turn: Turn) -> bool:
-        """True if a speech that is over within the robot's turn takes the floor."""
+    def _interrupts(self, speech: Span, turn: Turn, *, is_noise: bool = False) -> bool:
+        """True if a speech that is over within the robot's turn takes the floor.
+
+        is_noise: nothing is told of the sign unless words come, so that these may come after the turn.
+        """
         is_open = turn.kind == "asks" or speech.seconds <= WORDS_WAIT + ROUND
-        if speech.known is not None and is_open and (self._is_heard(speech) or speech.known < turn.until):
+        is_noise &= speech.seconds <= WORDS_WAIT + ROUND
+        if is_open and (self._is_known_in(speech, turn) or (is_noise and self._is_last(speech))):
             return speech.words not in LISTENING
         return speech.seconds > (WORDS_WAIT if self._timeline.is_worded else BRIEF) + ROUND
+
+    def _is_known_in(self, speech: Span, turn: Turn) -> bool:
+        """True if the words of a speech are known while they are waited for, or the turn goes on."""
+        return speech.known is not None and (self._is_heard(speech) or speech.known < turn.until)
 
     def _is_heard(self, speech: Span) -> bool:
         """True if the words of a speech are known while they are waited for."""
@@ -302,7 +343,8 @@ class Coder:
 
     def _person(self, side: Side, sign: Span) -> None:
         """Read a sign outside the robot's turns to this person."""
-        goes_with_words = sign.action != "speak" and self._words_beside(sign)
+        is_gesture = sign.action != "speak"
+        goes_with_words = is_gesture and (self._words_beside(sign) or not self._is_shown_to_robot(side, sign))
         if sign.since >= side.answers_until and not goes_with_words and not self._is_noise(sign):
             self._takes_turn(side, sign)
 
@@ -351,7 +393,13 @@ class Coder:
         last = (side.own[-1].until if side.own else BEFORE)[0]
         at = sign.since[0]
         waiting = [each for each in asked if last < each.asked.until[0] < at]
+        if sign.known is not None and sign.known[0] > sign.until[0] + WORDS_AFTER:  # nobody waited for these words
+            waiting = [each for each in waiting if sign.known[0] <= each.asked.until[0] + self._limit]
         return max(waiting, key=lambda each: each.asked.until, default=None)
+
+
+def _speaks_to_robot(each: Span, person: str) -> bool:
+    return each.who == person and each.action == "speak" and each.to == ROBOT
 
 
 def _known(act: Span | Turn | Absence) -> Instant:

@@ -201,7 +201,7 @@ class Stage:
         if person is None or not person.presence.here:
             return Belief(False)
         looks = "" if person.gaze.ended < inf else _first(person.gaze.targets)
-        return Belief(True, looks, person.talk.speaks_since is not None, actor.id in session.busy)
+        return Belief(True, looks, person.talk.speech is not None, actor.id in session.busy)
 
 
 def _first(targets: Iterable[str]) -> str:

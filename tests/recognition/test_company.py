@@ -230,6 +230,35 @@ words that end just before the robot's, and are known after these, answer
     robot: started 1, failed 8
     bob: started 3.2, failed 7.8
 
+... also when words come long after, if neither has spoken since
+    0 ann said 0; 1 robot asks ann 3; 1 bob looks robot; 2 bob speaks 0.4; 5.5 bob said 2 words=where,to; 30 end
+    robot: started 1, failed 8
+    bob: started 2, failed 6.4
+
+... and a listener's words that come late are a backchannel
+    0 ann said 0; 1 robot asks ann 3; 1 bob looks robot; 2 bob speaks 0.4; 5.5 bob said 2 words=uh-huh; 30 end
+    robot: started 1, failed 8
+    robot bc: started 2.4, succeeded 2.4, completed 2.4
+
+... but nothing of either if the robot has spoken to them since
+    0 ann said 0; 1 robot asks ann 1; 1 bob looks robot; 1.5 bob speaks 0.3; 4 robot asks bob 1; 6 bob said 1.5; 9 end
+    robot: started 1, failed 6
+    robot: started 4, failed 9
+
+noise in the robot's turn is the answer if its words come after the turn
+    0 ann said 0; 1 robot asks ann 3; 1 ann looks robot; 3 ann speaks 0.4; 6 ann said 3 words=wait; 30 end
+    robot: started 1, succeeded 4 after -1, completed 4
+
+a nod beside a listener's words that come late is one backchannel with them
+    0 ann said 0; 1 robot asks ann 9; 2 ann nods 0.4; 2 ann speaks 0.4; 6 ann said 2 words=hm; 9 end
+    robot: started 1, failed 14
+    robot bc: started 2.4, succeeded 2.4, completed 2.4
+
+a nod of who looks at nobody is for the robot that asks, also before it is known to whom her words before are
+    0 bob said 0 to=cy; 0.5 ann speaks 1; 1 robot asks ann 3; 1.6 ann nods 0.4; 2.4 ann said 0.5 to=bob; 20 end
+    robot: started 1, failed 8
+    robot bc: started 2, succeeded 2, completed 2
+
 a nod waits until it is known whether somebody has answered before
     1 robot asks ann 2; 2 ann looks robot; 2 bob looks robot; 4 bob speaks 2; 5 ann nods 0.4; 30 end
     robot: started 1, preempted 4 after 1 by bob

@@ -6,7 +6,7 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.perception import ActorFound, ActorLost
-from engage_hri.services.recognition.events.conversation import TURN_PATIENCE
+from engage_hri.services.recognition.events.exchange import TURN_PATIENCE
 from tests.bus.cuttable import CuttableHub
 from tests.recognition.observations import ROBOT
 from tests.recognition.reporting import GRACE, SPEECH, Belief, Running, all_of, ask, turn_ends

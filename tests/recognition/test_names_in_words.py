@@ -40,16 +40,20 @@ class Group:
         self._take(keys.WORLD, World(entities=tuple(entities)), at)
 
     def to(self, words: str) -> tuple[str, ...]:
-        """Those to whom bob says this."""
+        """Those to whom bob says this, as it is told when it is over."""
         self._take(keys.PERCEIVED_ACTION, ActionBegan(actor="bob", action="speak", at=stamp(3.0)), 3.0)
-        said = Utterance(
-            actor="bob", id="u", text=words, began=stamp(3.0), ended=stamp(3.9), at=stamp(3.9), final=True
-        )
-        self._take(keys.UTTERANCE, said, 3.9)
+        heard = Utterance(actor="bob", id="u", text="so", began=stamp(3.0), at=stamp(3.5), final=False)
+        self._take(keys.UTTERANCE, heard, 3.5)
         self._take(keys.PERCEIVED_ACTION, ActionEnded(actor="bob", action="speak", at=stamp(4.0)), 4.0)
-        return next(
-            (speech.to for floor in reversed(self._floors) for speech in floor.speeches if speech.actor == "bob"), ()
+        before = self._floors[-1]
+        said = Utterance(
+            actor="bob", id="u", text=words, began=stamp(3.0), ended=stamp(4.0), at=stamp(4.4), final=True
         )
+        self._take(keys.UTTERANCE, said, 4.4)
+        told = self._floors[-1]
+        assert (before.speeches, told.speeches) == ((), ())
+        assert all((each.since, each.until) == (stamp(3.0), stamp(4.0)) for each in told.ended)
+        return next((each.to for each in told.ended if each.actor == "bob"), ())
 
 
 def test_who_is_only_found_has_a_name() -> None:
@@ -103,11 +107,15 @@ def test_a_name_of_two_words_calls_one_person(words: str) -> None:
         ("mary ann", {"mary ann"}),
         ("I have told Mary Ann", set()),
         ("Look, Ann", {"ann"}),
+        ("マリ、見て", {"マリ"}),
+        ("赤いのを取って、マリ。", {"マリ"}),
+        ("赤いのを取って。でも、これもいい。それはマリ", set()),
+        ("看，那个红的，在那里，马力。", {"马力"}),
         ("", set()),
     ],
 )  # fmt: skip
 def test_words_call_whom_they_name(words: str, called: set[str]) -> None:
-    assert named(words, {name: name for name in ("mary", "ann", "mary ann")}) == called
+    assert named(words, {name: name for name in ("mary", "ann", "mary ann", "マリ", "马力")}) == called
 
 
 def test_without_names_nobody_is_called() -> None:

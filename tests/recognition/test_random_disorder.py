@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, RequestEvent, SignalTurn
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events import conversation, gazes, person, presence, session
+from engage_hri.services.recognition.events import exchange, gazes, person, presence, session
 from engage_hri.services.recognition.events.machine import Effect
 from engage_hri.services.recognition.events.session import Observation, Session
 from tests.random_cases import share_of
@@ -26,7 +26,7 @@ CELL = 0.04
 CONFIG = RecognitionConfig(manipulation_limit=8.3, adjacency_pair_limit=4.3, third_turn_limit=1.83)
 TIMES: dict[ModuleType, dict[str, float]] = {
     presence: {"FACE_GRACE": 2.3},
-    conversation: {"TURN_PATIENCE": 12.3},
+    exchange: {"TURN_PATIENCE": 12.3},
     session: {"TURN_PATIENCE": 12.3},
     gazes: {"AFTER_ROBOT_DIRECTED": 2.3},
     person: {

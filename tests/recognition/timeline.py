@@ -16,6 +16,8 @@ from tests.recognition.observations import PIECES, ROBOT, Log, request_event, st
 
 NAMES = ("ann", "bob", "cy", "dee", "eve")
 LIMIT = 4.0
+LATE_HEAD = 0.6
+"""Seconds by which the head of who speaks is late at most: heads turn with the voice, or after it."""
 Instant = tuple[float, int]
 """A time, and a place in the order of what happens then."""
 LISTENING = ("uh-huh", "yes, yes, okay", "genau")
@@ -200,9 +202,8 @@ class Drawing:
             one.known = max(one.known, (until[0], until[1] + 1))
         self.timeline.spans.append(one)
         if len(self.timeline.people) > 1:
-            self.timeline.spans.append(
-                Span(person, "look", (round(since[0] - 0.05, 6), 0), (round(until[0] + 0.05, 6), 0), to)
-            )
+            turns = since[0] + chance.choice((-0.05, self._between(0.0, min(LATE_HEAD, 0.45 * one.seconds))))
+            self.timeline.spans.append(Span(person, "look", (round(turns, 6), 0), (round(until[0] + 0.05, 6), 0), to))
 
     def _gesture(self, person: str, since: float, until: float) -> None:
         chance = self._chance
@@ -252,4 +253,23 @@ class Drawing:
                         if one.who == to and one.known is not None and one.until <= until <= one.known:
                             one.known = one.until[0], one.until[1] + 1
                 self.timeline.turns.append(turn)
+                if self.timeline.is_worded and not turn.is_aborted:
+                    self._draw_late_words(turn)
             at = until[0] + chance.choice((self._between(0.2, 2.0), self._between(0.5, 9.0)))
+
+    def _draw_late_words(self, turn: Turn) -> None:
+        """Let words of what is said into the robot's words come when it has been decided that there are none.
+
+        Of several people only where nothing else depends on when these are known: a nod beside them, or words before.
+        """
+        for one in self.timeline.spans:
+            is_within = any(since < one.since and one.until < until for since, until in turn.speech)
+            if one.action == "speak" and one.to == ROBOT and is_within and self._chance.random() < 0.3:
+                beside = [
+                    each for each in self.timeline.spans
+                    if each.who == one.who and each.action != "look"
+                    and one.since[0] - LIMIT < each.until[0] and each.since[0] <= one.until[0]
+                ]  # fmt: skip
+                if len(self.timeline.people) == 1 or beside == [one]:
+                    one.known = self._at(one.until[0] + self._between(0.9, 3.0))
+                    one.words = one.words or self._chance.choice((*LISTENING, *OTHER))

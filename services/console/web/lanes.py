@@ -89,12 +89,12 @@ class FloorLanes:
         """Take a message. at: its local instant. Returns whether it may change what is shown."""
         known = self._speeches
         match message:
-            case Floor(speeches=speeches):
-                going_on = {(each.actor, each.since): each for each in speeches}
-                for key, each in going_on.items():
-                    speech = known.get(key) or self._new(key, at, message.at)
-                    known[key] = replace(speech, to=each.to, until=None)
-                self._end(at, but=going_on)
+            case Floor(speeches=speeches, ended=ended):
+                for each in (*ended, *speeches):
+                    key = each.actor, each.since
+                    until = None if each.until is None else at - (message.at.seconds - each.until.seconds)
+                    known[key] = replace(known.get(key) or self._new(key, at, message.at), to=each.to, until=until)
+                self._end(at, but={(each.actor, each.since) for each in speeches})
             case Interjection(actor=actor, since=since, reading=reading, words=words):
                 speech = known.get((actor, since)) or self._new((actor, since), at, message.at, until=at)
                 known[actor, since] = replace(speech, taken=READINGS[reading], words=words)

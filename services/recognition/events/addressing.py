@@ -22,6 +22,7 @@ Before all of them: a sound that is over, and of which no words have come where 
 It is a cough, or a laugh at what a neighbor says.
 """
 
+import re
 from collections.abc import Collection, Iterable, Mapping
 
 from msgspec import Struct, field
@@ -38,8 +39,11 @@ LONGEST_UNTOLD: Seconds = 15.0
 A question of the robot waits so long, at most, until it is known that what somebody else says is no answer. Ours."""
 SHORT_CALL = 3
 """Number of words up to which a name at the end calls somebody. Ours."""
-MARKS = ".,!?;:…¡¿\"'“”„‘’«»、。！？"
+MARKS = ".,!?;:…¡¿\"'“”„‘’«»、，。！？"
 """Punctuation that may stand beside a name."""
+COMMAS = (",", "、", "，")
+WORDS = re.compile(r"[^\s、，。！？]+[、，。！？]*|[、，。！？]+")
+"""Words with their punctuation. After that of Japanese and Chinese no blank comes."""
 Addressees = frozenset[str]
 NOBODY: Addressees = frozenset()
 WHOEVER: Addressees = frozenset(("",))
@@ -55,6 +59,11 @@ class Spoken(Struct, kw_only=True):
     until: Seconds | None = None
     is_noise: bool = False
     """True if no words have come of it."""
+
+    @property
+    def named(self) -> Addressees:
+        """Ids of the addressees, as far as they are known."""
+        return NOBODY if self.to is None or self.to is WHOEVER else self.to
 
     def is_to(self, actor: str) -> bool:
         return self.to is WHOEVER or (self.to is not None and actor in self.to)
@@ -107,7 +116,7 @@ def named(words: str, names: Mapping[str, str]) -> Addressees:
     A name calls somebody if it stands first, last after a comma, or last of a few words: "hello robot". In the
     middle, and at the end of a sentence, it may be what the sentence is about.
     """
-    said = [word for word in words.split() if any(map(str.isalnum, word))]
+    said = [word for word in WORDS.findall(words) if any(map(str.isalnum, word))]
     if not said:
         return NOBODY
     lengths = range(1 + max((name.count(" ") for name in names), default=0), 0, -1)
@@ -117,7 +126,7 @@ def named(words: str, names: Mapping[str, str]) -> Addressees:
         said[-length:]
         for length in lengths
         if after + length <= len(said)
-        and (len(said) - length < SHORT_CALL or said[-length - 1].endswith(","))
+        and (len(said) - length < SHORT_CALL or said[-length - 1].endswith(COMMAS))
         and _plain(said[-length:]) in names
     ][:1]
     return frozenset(names[_plain(call)] for call in calls)

@@ -20,6 +20,7 @@ is decided once: when one reading is left, at the latest at its `deadline`. Thes
 """
 
 from math import inf
+from typing import Literal
 
 from msgspec import Struct
 
@@ -31,12 +32,13 @@ WORDS_WAIT: Seconds = 1.5
 
 
 class SignPart(Struct):
-    """A speech, or a gesture. until: None: it goes on."""
+    """A speech, or a gesture. until: None: it goes on. taken_for: of speech: what it has turned out to be."""
 
     action: Action
     since: Seconds
     confidence: Probability = 1.0
     until: Seconds | None = None
+    taken_for: Literal["", "noise", "backchannel", "turn"] = ""
 
 
 class ListenerSign(Struct):

@@ -32,7 +32,7 @@ class People:
         """Time of the last sign of each person who has gone or is not reported as present. The longest ago first."""
         self._met = 0
         self._unknown: dict[str, Seconds] = {}
-        self._asked: set[str] = set()
+        self._asked: dict[str, Seconds] = {}
         """`scene.unknown` and `scene.asked` when the deadlines of those who were asked were last updated."""
         self._contacts: dict[str, Probability | None] = {}
         """Contact of each person with the robot."""
@@ -178,7 +178,7 @@ class People:
         if scene.taken_up or self._writer.answered:
             self._tell_taken_up(at)
         while self._unknown != scene.unknown or self._asked != scene.asked:
-            self._unknown, self._asked = {**scene.unknown}, {*scene.asked}
+            self._unknown, self._asked = {**scene.unknown}, {**scene.asked}
             for id in [*scene.questions]:
                 self._update(self.persons[id])
             for id in sorted(self._unknown, key=lambda id: scene.place(id, self._unknown[id])):
@@ -225,9 +225,9 @@ class People:
         """
         id, scene, presence = person.id, self._scene, person.presence
         if not by_look:
-            is_asked = person.talk.is_asked
-            if is_asked or id in scene.asked:
-                self._asks(person, is_asked=is_asked)
+            asked_since = person.talk.asked_since
+            if asked_since < inf or id in scene.asked:
+                self._asks(person, asked_since)
             if (since := person.talk.undecided_since) is not None:
                 scene.unknown[id] = since
             elif scene.unknown:
@@ -239,14 +239,17 @@ class People:
         if presence.here is not (id in self._here) or presence.reported is not (id in scene.found):
             self._comes_or_goes(person)
 
-    def _asks(self, person: PersonRecognition, *, is_asked: bool) -> None:
-        """Note whether the robot asks the person, and the question if it waits for the answer."""
+    def _asks(self, person: PersonRecognition, since: Seconds) -> None:
+        """Note since when the robot asks the person, and the question if it waits for the answer."""
         id, scene, question = person.id, self._scene, person.talk.question
         if question is not None:
             scene.questions[id] = question
         else:
             scene.questions.pop(id, None)
-        (scene.asked.add if is_asked else scene.asked.discard)(id)
+        if since < inf:
+            scene.asked[id] = since
+        else:
+            scene.asked.pop(id, None)
 
     def _comes_or_goes(self, person: PersonRecognition) -> None:
         """Note whether the person is here, and whether that is reported."""

@@ -18,6 +18,9 @@ from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, in_time
 LINES_KEPT = 256
 SPOKEN_KEPT = 32
 """Number of speeches of all that are remembered with their addressees."""
+ENDED_TOLD = 4
+"""Number of speeches that are told once more when they are over: as many may end before it is known to whom the first
+was. Ours."""
 TOLD_MARGIN: Seconds = 0.1
 """Difference of the beginnings of a speech and of words that are told just before it. Ours."""
 SAME_INSTANT: Seconds = 0.001
@@ -156,8 +159,8 @@ class SessionScene:
         """The latest speeches whose addressees are known, of all."""
         self.questions: dict[str, Question] = {}
         """Questions of the robot that wait for an answer, by the person who was asked."""
-        self.asked: set[str] = set()
-        """People who were asked, as far as is known: they may have answered already."""
+        self.asked: dict[str, Seconds] = {}
+        """Since when people are asked, as far as is known: they may have answered already."""
         self.taken_up: list[TakenUp] = []
         """Answers to them by somebody else, which the person who was asked has yet to be told of."""
         self.unknown: dict[str, Seconds] = {}
@@ -240,6 +243,11 @@ class SessionScene:
         if not any(each is spoken for each in self.spoken):
             self.spoken.append(spoken)
 
+    def ended(self) -> list[Spoken]:
+        """The speeches that were over last of those with known addressees, in the order of their ends."""
+        over = [(each.until, each.since, each) for each in self.spoken if each.until is not None and each.named]
+        return [each for _, _, each in sorted(over, key=lambda one: one[:2])[-ENDED_TOLD:]]
+
     @property
     def robot_speaks_since(self) -> Seconds | None:
         """Time when the robot began what it says now; None: it is silent."""
@@ -278,7 +286,7 @@ class SessionScene:
 
     def place(self, person: str, at: Seconds) -> tuple[Seconds, bool, str]:
         """Place of what a person begins to say in the order in which people are heard: who is asked comes first."""
-        return at, person not in self.asked, person
+        return at, self.asked.get(person, inf) >= at, person
 
     def may_be_answered(self, person: str, until: Seconds) -> bool:
         """True if somebody else has begun to speak by then, of whom it is not known yet to whom it is."""

@@ -23,8 +23,8 @@ from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.addressing import NOBODY, WHOEVER, WORDS_AFTER, Addressees, Spoken
-from engage_hri.services.recognition.events.conversation import TURN_PATIENCE
+from engage_hri.services.recognition.events.addressing import WHOEVER, WORDS_AFTER, Addressees, Spoken
+from engage_hri.services.recognition.events.exchange import TURN_PATIENCE
 from engage_hri.services.recognition.events.history import ActionHistory, Latest
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock, anchor
 from engage_hri.services.recognition.events.machine import Effect, EventWriter, Mishap, OngoingEvent
@@ -106,14 +106,14 @@ class Session:
         """True if more than one person is here."""
         return len(self.scene.company("")) > 1
 
-    def floor(self) -> list[tuple[str, Seconds, Addressees]]:
-        """All speeches that go on, the first first: who speaks, since when, and to whom (empty: not known yet)."""
+    def floor(self) -> list[Spoken]:
+        """All speeches that go on, the first first; their addressees may not be known yet."""
         said = self.scene.robot_spoken
-        speeches = [] if said is None else [(self.robot, said.since, (said.to or NOBODY) - WHOEVER)]
+        speeches: list[Spoken] = [] if said is None else [said]
         for person in self.persons.values():
-            if person.presence.here and person.talk.speaks_since is not None:
-                speeches.append((person.id, person.talk.speaks_since, person.talk.speaks_to))
-        return sorted(speeches, key=lambda each: (each[1], each[0]))
+            if person.presence.here and (speech := person.talk.speech) is not None:
+                speeches.append(speech)
+        return sorted(speeches, key=lambda each: (each.since, each.actor))
 
     def contacts(self) -> dict[str, Probability | None]:
         """Contact with each person for whom it has changed since the last call."""

@@ -46,27 +46,17 @@ class Talk(KindRecognizer):
         self._conversation = Conversation(id, scene, config, writer)
         self._line: deque[tuple[Seconds, Step | OwnSpeech]] = deque()
         """What is not told yet, with its times. The first is a speech of which it is not known to whom it is."""
-        self._is_asked_in_line = False
-        """True if a first turn of the robot is in line."""
-        self._speech: OwnSpeech | None = None
+        self._asked_in_line: Seconds = inf
+        """Start of the first turn of the robot that is in line; infinite: none is."""
+        self.speech: OwnSpeech | None = None
         """The speech of the person that goes on."""
         self._noises: Latest[Seconds, OwnSpeech] = Latest(NOISES_KEPT)
         """The latest sounds of which no words have come, by their starts."""
 
     @property
-    def speaks_since(self) -> Seconds | None:
-        """Time when the person began what they say now; None: they are silent."""
-        return None if self._speech is None else self._speech.since
-
-    @property
-    def speaks_to(self) -> Addressees:
-        """Addressees of the speech that goes on; empty: they are not known, or there is none."""
-        return NOBODY if self._speech is None or self._speech.to is None else self._speech.to
-
-    @property
     def is_in_contact(self) -> bool:
         """True while the person says something that is known to be for the robot."""
-        return self._speech is not None and self._speech.is_to(self._scene.robot)
+        return self.speech is not None and self.speech.is_to(self._scene.robot)
 
     @property
     def takes_floor_since(self) -> Seconds:
@@ -76,19 +66,20 @@ class Talk(KindRecognizer):
     @property
     def question(self) -> Question | None:
         """The robot's question that waits for the person's answer, as far as is known; None: none does."""
-        question = self._conversation.pair.question
+        question = self._conversation.exchange.pair.question
         return question._replace(known_until=self._line[0][0]) if question is not None and self._line else question
 
     @property
     def undecided_since(self) -> Seconds | None:
         """Start of the first of what the person says of which it is not known whether it is for the robot."""
-        beside = self._conversation.beside_since
+        beside = self._conversation.listener.beside_since
         return beside if beside is not None or not self._line else self._line[0][0]
 
     @property
-    def is_asked(self) -> bool:
-        """True if the robot asks the person, or waits for an answer, as far as is known."""
-        return self._is_asked_in_line or self._conversation.pair.may_be_answered
+    def asked_since(self) -> Seconds:
+        """Time since when the robot asks the person, or waits for the answer, as far as is known; else infinite."""
+        pair = self._conversation.exchange.pair
+        return pair.event.started if pair.event is not None and pair.may_be_answered else self._asked_in_line
 
     @property
     def is_under_way(self) -> bool:
@@ -145,7 +136,7 @@ class Talk(KindRecognizer):
 
     def _speaks(self, at: Seconds, confidence: Probability, face: str) -> None:
         """Take the beginning of a speech. face: whose face the person looks at."""
-        self._speech = speech = self._own_speech(at, confidence, face)
+        self.speech = speech = self._own_speech(at, confidence, face)
         speech.told, speech.words = self._scene.told_to(self.id, at), self._writer.text_of(self.id, at)
         # What waits in line may be the robot's own turn, so that only the scene knows that it has begun.
         said = self._scene.robot_spoken
@@ -160,12 +151,12 @@ class Talk(KindRecognizer):
             self._writer.interject(self.id, at, "open", at)
             speech.is_interjected = True
         if not self._line:
-            self._conversation.next_sign_begins()
+            self._conversation.listener.next_begins()
         self._queue(at, speech)
 
     def _falls_silent(self, at: Seconds) -> None:
         """Take the end of the speech that goes on."""
-        speech, self._speech = self._speech, None
+        speech, self.speech = self.speech, None
         if speech is None:
             return
         speech.until = at
@@ -178,14 +169,15 @@ class Talk(KindRecognizer):
 
         Of who looks at nobody's it is to the robot if that has just spoken to the person.
         """
-        is_asked = self._conversation.is_spoken_to
-        if not self._scene.company(self.id) or face == self._scene.robot or (not face and is_asked):
+        if not self._scene.company(self.id) or face == self._scene.robot:
             self._take_in_order(at, step)
+        elif not face:  # what is in line may be the robot's words
+            self._take_in_order(at, lambda talk: step(talk) if talk.is_spoken_to else None)
 
     def goes_on(self, action: Action, since: Seconds, at: Seconds, confidence: Probability, face: str) -> None:
         """Take an action that goes on, known only now, at `at`. It has been decided by the looks of now to whom."""
         if action == "speak":
-            self._speech = speech = self._own_speech(since, confidence, face)
+            self.speech = speech = self._own_speech(since, confidence, face)
             if not self._find(speech, face, at):
                 self._likely(speech, at)
             if not speech.is_to(self._scene.robot):
@@ -217,9 +209,9 @@ class Talk(KindRecognizer):
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         """Take the person's leaving: nothing waits any longer."""
-        if self._speech is not None and self._speech.until is None:
-            self._speech.until = until
-        self._speech = None
+        if self.speech is not None and self.speech.until is None:
+            self.speech.until = until
+        self.speech = None
         self._noises.clear()
         for speech in self._undecided:
             self._decide(speech, at)
@@ -266,7 +258,8 @@ class Talk(KindRecognizer):
             self.take(at, lambda talk: talk.robot_announces(event, ended))
             return
         self._take_in_order(at, lambda talk: talk.robot_asks(event))
-        self._is_asked_in_line = bool(self._line)
+        if self._line:
+            self._asked_in_line = min(at, self._asked_in_line)
         if ended is not None:
             self.take(at, lambda talk: talk.turn_ends(max(ended, at)))
 
@@ -299,7 +292,7 @@ class Talk(KindRecognizer):
 
     def _take_in_order(self, at: Seconds, step: Step) -> None:
         """Take what ends a question of the robot, after what somebody else may have answered before."""
-        if self.is_asked and self._waits_for_others(at):
+        if self.asked_since < inf and self._waits_for_others(at):
             self._line.append((at, step))
         else:
             self.take(at, step)
@@ -363,7 +356,7 @@ class Talk(KindRecognizer):
         """Decide to whom a speech is by what is likely."""
         if speech.until is None:
             speech.faces.turns(speech.faces.face, at)
-        waits = self._conversation.pair.may_be_answered_with("speak")
+        waits = self._conversation.exchange.pair.may_be_answered_with("speak")
         awaited_by = frozenset((self._scene.robot,)) if waits else NOBODY
         is_untold = self._scene.tells_addressees and not says_words(speech.words)
         within = self._config.adjacency_pair_limit
@@ -380,20 +373,23 @@ class Talk(KindRecognizer):
 
     def go_on(self, now: Seconds) -> None:
         """Tell all in line up to the next speech of which it is not known to whom it is."""
-        while self.may_go_on(now):
+        while self._line:
             at, item = self._line[0]
+            self._catch_up(at)
+            if isinstance(item, OwnSpeech):
+                self._conversation.listener.next_begins()
+            if not self.may_go_on(now):
+                break
             if isinstance(item, OwnSpeech) and not self._is_known(item):
                 self._decide(item, now)
                 continue
             self._line.popleft()
-            self._catch_up(at)
             if not isinstance(item, OwnSpeech):
                 item(self._conversation)
             elif item.is_to(self._scene.robot):
                 self._conversation.speaks(at, item.confidence, beside=item.is_beside)
-        if self._line:
-            self._catch_up(self._line[0][0])
-        self._is_asked_in_line &= bool(self._line)
+        if not self._line:
+            self._asked_in_line = inf
 
     def _catch_up(self, until: Seconds) -> None:
         """Take the steps of the conversation that were due before `until`."""

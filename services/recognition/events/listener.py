@@ -1,0 +1,249 @@
+"""A person as the robot's listener: the sign that is open, and what became of those before. Pure.
+
+A sign is decided once, by rules (`listener_sign`). But words may come after that: a slow recognizer tells "stop" when
+the sound has been taken for a cough, and "yes, yes, okay" when it was too long for a listener's. And of a voice in
+which only the robot's own words were heard, the person's words may come next. So what each speech was taken for is
+remembered, and words correct it:
+
+| taken for | a listener's words make it | other words make it | as long as |
+|---|---|---|---|
+| noise, or the robot's own words | a backchannel | a turn | the turn goes on, or neither has spoken since |
+| a backchannel | | a turn | the turn goes on |
+| a turn: the answer into the turn | a backchannel | | the turn goes on |
+
+The turn is that of the robot in which it was said. When that is over what has been told stays, and what was noise,
+so that nothing has been told, is as any sound whose words come late (decision 0199). If somebody has spoken since it
+says nothing any more: an old "stop" would answer what was asked after it. Of who stands by, and says something while
+the robot speaks to others, nothing is in a turn of theirs.
+"""
+
+from math import inf
+
+from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.recognition import InterjectionReading
+from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.events.addressing import WORDS_AFTER
+from engage_hri.services.recognition.events.backchannel import Backchannel
+from engage_hri.services.recognition.events.exchange import Exchange
+from engage_hri.services.recognition.events.history import Latest
+from engage_hri.services.recognition.events.listener_sign import WORDS_WAIT, ListenerSign, SignPart
+from engage_hri.services.recognition.events.machine import EventWriter, OngoingEvent, SpeechStart
+from engage_hri.services.recognition.events.scene import SessionScene
+from engage_hri.services.text.listening import is_listening, says_words
+
+SPEECHES_KEPT = 8
+"""Number of speeches of which words may still tell that they were something else."""
+
+
+class Listener:
+    """The signs of one person while the robot has the floor. exchange: the turns of the two."""
+
+    def __init__(
+        self, id: str, scene: SessionScene, config: RecognitionConfig, writer: EventWriter, exchange: Exchange
+    ) -> None:
+        self._id = id
+        self._scene = scene
+        self._config = config
+        self._writer = writer
+        self._exchange = exchange
+        self._backchannel = Backchannel(writer, limit=config.backchannel_limit)
+        self.sign: ListenerSign | None = None
+        """What the person does in the robot's turn, as long as it is not decided what it is."""
+        self._speeches: Latest[Seconds, SignPart] = Latest(SPEECHES_KEPT)
+        """The person's latest speeches, by their starts."""
+
+    # -- a sign -------------------------------------------------------------------------------------------------
+
+    def speaks(self, since: Seconds, confidence: Probability) -> SignPart:
+        """Note a speech, as a sign or not."""
+        speech = self._speeches[since] = SignPart("speak", since, confidence)
+        return speech
+
+    def begins(self, part: SignPart, *, beside: bool = False) -> None:
+        """Take a part of the sign that goes on, or of a new one. beside: the robot speaks to others."""
+        self.next_begins()
+        self._joins(part, beside=beside)
+
+    def next_begins(self) -> None:
+        """Decide the sign if it is over: its words have not come until the next one begins."""
+        if self.sign is not None and self.sign.until is not None:
+            self.judge(self.sign.until)
+        if self.sign is not None and self.sign.until is not None:
+            self._listens(self.sign, self.sign.until)
+
+    def _joins(self, part: SignPart, *, beside: bool = False) -> None:
+        if self.sign is None:
+            self.sign = ListenerSign([], is_beside=beside)
+        self.sign.parts.append(part)
+        self.sign.is_wordless = False  # this one's words may come
+
+    def goes_on(self) -> bool:
+        """True while a sign goes on."""
+        return self.sign is not None and self.sign.until is None
+
+    @property
+    def is_beside(self) -> bool:
+        """True while a sign is open that has begun beside the robot's words to others."""
+        return self.sign is not None and self.sign.is_beside
+
+    @property
+    def beside_since(self) -> Seconds | None:
+        """Start of what the person says while the robot speaks to others, as long as it may be a turn."""
+        sign = self.sign
+        if sign is None or not sign.is_beside or all(map(self._is_echo, sign.speeches)):
+            return None
+        return sign.since
+
+    def ends(self, action: Action, at: Seconds) -> None:
+        """End an action of the person."""
+        if self.sign is not None:
+            for part in self.sign.going_on(action):
+                part.until = at
+            self.judge(at)
+
+    def person_gone(self, at: Seconds, until: Seconds) -> None:
+        sign, self.sign = self.sign, None
+        if sign is not None and not sign.speeches:
+            self._listens(sign, until)
+        for speech in sign.speeches if sign is not None else ():
+            self._tell(speech, at)
+
+    # -- what decides it ----------------------------------------------------------------------------------------
+
+    @property
+    def deadline(self) -> Seconds:
+        """Time at which the sign is decided by its length, or for want of words; infinite: it is not."""
+        sign = self.sign
+        if sign is None or (sign.speeches and self._asks_for_nothing(sign.speeches[-1])):
+            return inf
+        if not self._scene.is_worded:
+            return sign.deadline(self._config.backchannel_limit)
+        if sign.is_beside:
+            return sign.deadline(self._scene.longest_unknown, WORDS_AFTER)
+        return sign.deadline(WORDS_WAIT)
+
+    def pass_time(self, at: Seconds) -> None:
+        """Decide the sign: its speech has become too long for a backchannel, or its words have not come."""
+        assert self.sign is not None
+        if speech := self.sign.going_on("speak"):
+            self._takes_floor(speech[0], at, "interruption")
+        else:
+            self.sign.is_wordless = True
+            self.judge(at)
+
+    def judge(self, at: Seconds) -> None:
+        """Decide the sign, if what is known leaves one reading of it."""
+        sign = self.sign
+        if sign is None:
+            return
+        speeches = sign.speeches
+        interrupts = next((speech for speech in speeches if self._is_listening(speech) is False), None)
+        is_heard = all(map(self._asks_for_nothing, speeches))
+        is_known = not self._scene.is_worded or sign.is_wordless or is_heard
+        if interrupts is not None:
+            self._takes_floor(interrupts, at, "interruption")
+        elif sign.until is not None and is_known:
+            self._listens(sign, sign.until)
+
+    def robots_turn_ends(self, at: Seconds, reading: InterjectionReading = "answer") -> None:
+        """Take what goes on of the sign for the answer, because the robot's turn is over.
+
+        Of several parts it is the one that began first. A gesture that answers nothing here stays what it is.
+        """
+        for part in self.sign.going_on() if self.sign is not None else ():
+            is_answer = not self._is_echo(part) if part.action == "speak" else self._answers_with(part)
+            if is_answer:
+                self._takes_floor(part, at, reading)
+                return
+
+    def _answers_with(self, part: SignPart) -> bool:
+        return self._exchange.pair.may_be_answered_with(part.action)
+
+    def understand(self, since: Seconds, at: Seconds, *, in_turn: bool, is_last: bool) -> None:
+        """Judge a speech by its words.
+
+        in_turn: the robot's turn goes on in which it was said. is_last: neither has begun to say anything since.
+        """
+        speech = self._speeches.get(since)
+        if speech is None:
+            return
+        if self.sign is not None and any(part is speech for part in self.sign.parts):
+            if self._is_echo(speech):
+                self._tell(speech, at)  # the robot need not wait until it is over
+            self.judge(at)
+            return
+        listens = self._is_listening(speech)
+        is_new = speech.taken_for == "noise" and (in_turn or is_last)
+        if listens is False and (is_new or (in_turn and speech.taken_for == "backchannel")):
+            self._is_turn(speech, "interruption" if in_turn else "answer", at)
+        elif listens and (is_new or self._exchange.pair.was_listening(since)):
+            if speech.until is None:
+                self._joins(speech)
+            else:
+                self._listens(ListenerSign([speech]), speech.until)
+
+    # -- what it is ---------------------------------------------------------------------------------------------
+
+    def _listens(self, sign: ListenerSign, until: Seconds) -> None:
+        """Take the sign for a backchannel, but for sounds without words: these are noise where words are told."""
+        if sign is self.sign:
+            self.sign = None
+        for speech in sign.speeches:
+            self._tell(speech, until)
+            speech.taken_for = "noise" if self._is_noise(speech) else "backchannel"
+        parts = [part for part in sign.parts if part.taken_for != "noise"]
+        if all(part.action == "point" for part in parts):
+            return  # a point in the robot's turn directs the gaze, and says nothing
+        told = ListenerSign(parts)
+        self._backchannel.speaks(
+            OngoingEvent(
+                kind="backchannel", initiator=self._scene.robot, responder=self._id, started=told.since,
+                confidence=told.confidence,
+                spoken=tuple(SpeechStart(self._id, speech.since) for speech in told.speeches),
+            )
+        )  # fmt: skip
+        self._backchannel.ends(until if told.until is None else told.until)
+        for speech in sign.speeches:
+            speech.taken_for = "backchannel"  # one sign gives one, also if words of it come later
+
+    def _takes_floor(self, part: SignPart, at: Seconds, reading: InterjectionReading) -> None:
+        """Take a part of the sign as a turn of the person since it began. Speech before it was a listener's."""
+        for speech in self.sign.speeches if self.sign is not None else ():
+            if speech.since < part.since:
+                self._tell(speech, at)
+        self.sign = None
+        self._is_turn(part, reading, at)
+
+    def _is_turn(self, part: SignPart, reading: InterjectionReading, at: Seconds) -> None:
+        if part.action == "speak":
+            self._writer.interject(self._id, part.since, reading, at)
+        part.taken_for = "turn"
+        self._exchange.take(part)
+
+    def _tell(self, speech: SignPart, at: Seconds) -> None:
+        """Tell that a speech was a listener's, or noise where its words would have come."""
+        reading: InterjectionReading = "noise" if self._is_noise(speech) else "backchannel"
+        self._writer.interject(self._id, speech.since, reading, at)
+
+    # -- its words ----------------------------------------------------------------------------------------------
+
+    def _words(self, speech: SignPart) -> str:
+        return self._writer.text_of(self._id, speech.since)
+
+    def _is_listening(self, speech: SignPart) -> bool | None:
+        """True if the words of a speech are a listener's; None: there are none, as far as is known."""
+        words = self._words(speech)
+        return is_listening(words) if says_words(words) else None
+
+    def _is_noise(self, speech: SignPart) -> bool:
+        """True if no words of a speech are known, where they would be."""
+        return self._scene.is_worded and not says_words(self._words(speech))
+
+    def _is_echo(self, speech: SignPart) -> bool:
+        """True if nothing but the robot's own words is known of a speech."""
+        return (self._id, speech.since) in self._scene.echoes and not says_words(self._words(speech))
+
+    def _asks_for_nothing(self, speech: SignPart) -> bool:
+        """True if a speech is known to be no turn: by a listener's words, or because it is the robot's own words."""
+        return bool(self._is_listening(speech)) or self._is_echo(speech)
