@@ -90,7 +90,10 @@ class Talk(KindRecognizer):
 
     @property
     def deadline(self) -> Seconds:
-        return self._decided_at if self._line else self._conversation.deadline
+        if not self._line:
+            return self._conversation.deadline
+        speech = self._undecided_first
+        return inf if speech is None else self._decided_at(speech)
 
     def pass_time(self, at: Seconds) -> None:
         if self._line:
@@ -98,12 +101,8 @@ class Talk(KindRecognizer):
         else:
             self._conversation.pass_time(at)
 
-    @property
-    def _decided_at(self) -> Seconds:
-        """Time at which the first speech in line is decided; infinite: it is, and waits."""
-        _, speech = self._line[0]
-        if not isinstance(speech, OwnSpeech) or self._is_known(speech):
-            return inf
+    def _decided_at(self, speech: OwnSpeech) -> Seconds:
+        """Time at which the first speech in line is decided."""
         if speech.until is None:
             return speech.since + self._scene.longest_unknown
         may_call = self._scene.is_worded and not speech.faces.most(speech.since)
@@ -302,9 +301,21 @@ class Talk(KindRecognizer):
         return self._scene.is_contested(self.id, at)
 
     @property
+    def _is_behind_others(self) -> bool:
+        """True if the first in line waits until it is known whether somebody else has answered before."""
+        since = self.undecided_since
+        return since is not None and self._waits_for_others(since)
+
+    @property
     def _undecided(self) -> list[OwnSpeech]:
         speeches = [each for _, each in self._line if isinstance(each, OwnSpeech)]
         return [each for each in speeches if each.to is None or each.may_be_noise]
+
+    @property
+    def _undecided_first(self) -> OwnSpeech | None:
+        """The first in line, if it is a speech that is not decided; None: it is to be told next."""
+        first = self._line[0][1]
+        return first if isinstance(first, OwnSpeech) and not self._is_known(first) else None
 
     def _may_be_noise(self, speech: OwnSpeech) -> bool:
         """True if the first speech in line may be a cough. The conversation judges those into its turn."""
@@ -367,9 +378,8 @@ class Talk(KindRecognizer):
         """True if it is decided by `now` to whom the first speech in line is, or if what is decided may be told."""
         if not self._line:
             return False
-        decided_at, since = self._decided_at, self.undecided_since
-        assert since is not None
-        return not self._waits_for_others(since) if decided_at == inf else decided_at <= now
+        speech = self._undecided_first
+        return not self._is_behind_others if speech is None else self._decided_at(speech) <= now
 
     def go_on(self, now: Seconds) -> None:
         """Tell all in line up to the next speech of which it is not known to whom it is."""
@@ -378,11 +388,13 @@ class Talk(KindRecognizer):
             self._catch_up(at)
             if isinstance(item, OwnSpeech):
                 self._conversation.listener.next_begins()
-            if not self.may_go_on(now):
-                break
-            if isinstance(item, OwnSpeech) and not self._is_known(item):
-                self._decide(item, now)
+            if (speech := self._undecided_first) is not None:
+                if self._decided_at(speech) > now:
+                    break
+                self._decide(speech, now)
                 continue
+            if self._is_behind_others:
+                break
             self._line.popleft()
             if not isinstance(item, OwnSpeech):
                 item(self._conversation)
