@@ -59,6 +59,8 @@ class Spoken(Struct, kw_only=True):
     until: Seconds | None = None
     is_noise: bool = False
     """True if no words have come of it."""
+    is_noted: bool = False
+    """True once it counts for what others say after it."""
 
     @property
     def named(self) -> Addressees:
@@ -67,10 +69,6 @@ class Spoken(Struct, kw_only=True):
 
     def is_to(self, actor: str) -> bool:
         return self.to is WHOEVER or (self.to is not None and actor in self.to)
-
-    def is_just_before(self, at: Seconds, within: Seconds) -> bool:
-        """True if a speech that begins at `at` comes during this one, or at most `within` after it."""
-        return self.since < at and (self.until is None or at <= self.until + within)
 
 
 class FaceTimes(Struct):
@@ -162,9 +160,11 @@ def likely(
     """
     if face := speech.faces.most(speech.since):
         return frozenset((face,))
-    actor, since = speech.actor, speech.since
-    heard = [each for each in spoken if (each.actor == actor or each.is_to(actor)) and not each.is_noise]
-    last = max((each for each in heard if each.is_just_before(since, within)), key=_since, default=None)
+    actor, at = speech.actor, speech.since
+    # Those that it comes during, or at most `within` after: few of all.
+    recent = [each for each in spoken if each.since < at and (each.until is None or at <= each.until + within)]
+    heard = [each for each in recent if (each.actor == actor or each.is_to(actor)) and not each.is_noise]
+    last = max(heard, key=_since, default=None)
     if last is None:
         return awaited_by
     if last.actor != speech.actor:

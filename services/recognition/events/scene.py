@@ -240,7 +240,8 @@ class SessionScene:
     def note_spoken(self, spoken: Spoken) -> None:
         """Remember a speech whose addressees are known now."""
         self.floor_changes += 1
-        if not any(each is spoken for each in self.spoken):
+        if not spoken.is_noted:
+            spoken.is_noted = True
             self.spoken.append(spoken)
 
     def ended(self) -> list[Spoken]:
@@ -282,7 +283,8 @@ class SessionScene:
         if not self.asked or not self.unknown:
             return False
         place = self.place(person, at)
-        return any(who != person and self.place(who, since) < place for who, since in self.unknown.items())
+        before = [who for who, since in self.unknown.items() if since <= at and who != person]
+        return any(self.place(who, self.unknown[who]) < place for who in before)
 
     def place(self, person: str, at: Seconds) -> tuple[Seconds, bool, str]:
         """Place of what a person begins to say in the order in which people are heard: who is asked comes first."""
