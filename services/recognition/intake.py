@@ -210,13 +210,14 @@ class Intake:
     def _join(self, join: Join) -> None:
         """Take two people for one.
 
-        The person who has come last goes on, and the other is forgotten, unless nothing is open with the newer and
-        the former has hardly gone.
+        One of the two goes on, and what is open with the other is lost: the former goes on as long as that is here,
+        unless something is open with the newer alone.
         """
         session, newer, former, now = self._recognizer.session, join.newer, join.former, self._now
         before = session.persons.get(former)
         is_here = before is not None and before.presence.here
-        goes_on = newer not in session.persons or (is_here and not session.has_open_event(newer))
+        is_best = session.has_open_event(former) or not session.has_open_event(newer)
+        goes_on = newer not in session.persons or (is_here and is_best)
         kept, other = (former, newer) if goes_on else (newer, former)
         self._identities.join(kept, other)
         self._tell_again(join.before, join.name)
@@ -258,7 +259,7 @@ class Intake:
                 out.append(PublishMessage(keys.connection_event(name, event.kind), event))
         for message in self._open_events.join(other, name, at):
             out.append(PublishMessage(keys.open_events(message.actor), message))
-        self._statistics.join(other, name)
+        self._statistics.join(other, name, self._now)
         states = (keys.open_events(other), *([keys.statistics(other)] if other != "all" else []))
         out.append(WithdrawStates(states))
         self._note(())

@@ -16,23 +16,16 @@ from msgspec import Struct
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, Utterance
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.services.client.people.actions import WORD, speaking_time
+from engage_hri.services.client.people.actions import speaking_time
 from engage_hri.services.reports.ongoing_actions import ActionEvent
 from engage_hri.services.simulation.chance import Chance
 from engage_hri.services.simulation.company import Company
 from engage_hri.services.simulation.human import AWAY, Act, Human, LookAt, Pause, Start, Stop
 from engage_hri.services.simulation.party_habits import PartyHabits
+from engage_hri.services.simulation.party_words import TO_ROBOT, answer, turn
 from engage_hri.services.simulation.speech import HeardSpeech, Hearing, speech
 
 NAMES = ("ann", "bob", "cy", "dee", "eve", "flo", "gus", "hal")
-TALK = (
-    "I went to the market on Saturday", "they had those small pears again", "we could try that next week",
-    "no way", "did you see the new bridge", "it was much colder than last year", "my sister told me about it",
-    "which one do you mean", "so we took the later train", "and then the dog ate all of it",
-)  # fmt: skip
-"""What they say, again and again until the time is over."""
-TO_ROBOT = ("What time is it?", "Can you see that from there?", "What do you think about it?")
-ANSWERS = ("I think so.", "No, not really.", "Maybe, I am not sure.", "Of course I do.")
 FEEDBACK = ("mhm", "yeah", "uh-huh", "right")
 NOD: Seconds = 0.5
 AGAIN: Seconds = 0.5
@@ -141,7 +134,8 @@ class Party(Company):
         else:
             habits, chance = self._habits, self._chance
             seconds = speaking_time(line.words) if line.words else habits.turn.draw(chance)
-            said = self._take_turn(line, line.words or self._words(seconds), seconds, now)
+            before = self._last.words if self._last is not None and self._last.actor == line.to else ""
+            said = self._take_turn(line, line.words or turn(before, seconds, chance), seconds, now)
             if chance.random() < habits.laughs:
                 self._plan(said.ended, partial(self._laugh, line.actor))
             gap = habits.answer if line.to == self._robot else habits.gap
@@ -173,12 +167,6 @@ class Party(Company):
         if not others or (chance.random() < self._habits.addresses_robot and not is_robots_turn):
             return ScriptLine(actor, self._robot, chance.choice(TO_ROBOT))
         return ScriptLine(actor, chance.choice(others), "")
-
-    def _words(self, seconds: Seconds) -> str:
-        words = ""
-        while not words or speaking_time(words) + WORD < seconds:
-            words = f"{words}, {self._chance.choice(TALK)}".strip(", ")
-        return f"{words}."
 
     def _say(self, actor: str, to: str, kind: Kind, words: str, seconds: Seconds, now: Seconds) -> Saying:
         said = Saying(actor, to, kind, words, now, now + seconds)
@@ -284,17 +272,19 @@ class Party(Company):
         if others and chance.random() < habits.answers_for_another:
             asked = chance.choice(others)
         self._asked.add(asked)
-        self._plan(max(now, self._robot_ended + habits.answer.draw(chance)), partial(self._answer, asked))
+        self._plan(
+            max(now, self._robot_ended + habits.answer.draw(chance)), partial(self._answer, asked, heard.words)
+        )
         if self._is_silent(asked, now):
             self._attend(asked, self._robot, now)
 
-    def _answer(self, person: str, now: Seconds) -> None:
+    def _answer(self, person: str, question: str, now: Seconds) -> None:
         if self._is_silent(person, now):
             self._asked.discard(person)
-            words = self._chance.choice(ANSWERS)
+            words = answer(question, self._chance)
             self._last = self._say(person, self._robot, "answer", words, speaking_time(words), now)
         else:
-            self._plan(self._speaking[person] + self._habits.look[0], partial(self._answer, person))
+            self._plan(self._speaking[person] + self._habits.look[0], partial(self._answer, person, question))
 
     # -- what somebody does -------------------------------------------------------------------------------------
 

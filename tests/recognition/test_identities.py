@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.behaviors import Action, TurnSignal
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import (
@@ -19,7 +19,14 @@ from engage_hri.schemas.perception import (
     HeadPose,
     OngoingActions,
 )
-from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, OpenEvents, SamePeople, Statistics
+from engage_hri.schemas.recognition import (
+    ConnectionEvent,
+    EventOutcome,
+    OpenEvents,
+    SamePeople,
+    SignalTurn,
+    Statistics,
+)
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig
@@ -165,6 +172,50 @@ def test_who_had_gone_and_comes_back_as_another_is_counted_once() -> None:
         ("started", "face_3", False), ("started", "ann", True), ("failed", "ann", False),
     ]  # fmt: skip
     assert told.counted("ann") == told.counted("") == 2
+
+
+def test_of_two_with_open_events_who_was_known_first_goes_on() -> None:
+    told = Told()
+    told.found("ann", 0.0)
+    told.until(1.0)
+    asked = request_event("adjacency_pair", 1.0, responder="ann", turn="turn-1")
+    told.outputs += told.intake.take(Input(keys.EVENT, asked, "realizer", 1.0), 1.0)
+    told.begins(ROBOT, "speak", 1.0)
+    told.ends(ROBOT, "speak", 2.0)
+    ended = SignalTurn(
+        id="e", requester="realizer", at=stamp(2.0), block="block-1",
+        signal=TurnSignal(id="e", turn="turn-1", signal="ended", actor="ann"),
+    )  # fmt: skip
+    told.outputs += told.intake.take(Input(keys.TURN, ended, "realizer", 2.0), 2.0)
+    told.found("face_3", 2.5)
+    told.begins("face_3", "look", 2.6, ROBOT)
+    told.found("face_3", 3.0, same_as="ann")
+    told.begins("face_3", "speak", 3.5)
+
+    states = [(each.kind, each.state, each.person(ROBOT)) for each in told.events if not each.retold]
+    assert states == [
+        ("adjacency_pair", "started", "ann"), ("mutual_facial_gaze", "started", "face_3"),
+        ("mutual_facial_gaze", "lost", "ann"), ("adjacency_pair", "succeeded", "ann"),
+    ]  # fmt: skip
+
+
+def test_who_is_named_a_second_late_comes_once() -> None:
+    told = Told()
+    told.take(0.0, people_at({}))
+    told.found("ann", 0.0)
+    told.begins("ann", "look", 1.0, ROBOT)
+    told.until(10.0)
+    told.lost("ann", 10.0)
+    told.found("face_3", 10.2)
+    told.begins("face_3", "look", 10.3, ROBOT)
+    told.until(11.2)
+    told.found("face_3", 11.2, same_as="ann")
+    told.until(20.0)
+
+    levels = [
+        each.level for each in told.messages(Statistics) if isinstance(each, Statistics) and each.actor == "ann"
+    ]
+    assert [each for each, before in zip(levels[1:], levels, strict=False) if each != before] == ["engaged"]
 
 
 def test_the_robot_asks_who_it_has_been_told_of() -> None:

@@ -117,3 +117,35 @@ def test_each_is_told_open_and_then_decided_in_time(seed: int) -> None:
             decided = [each for each in own if each[0] != "open"]
             assert decided, one
             assert decided[0][1] <= one.since + max(one.lasts, WAIT) + 1e-6
+
+
+@pytest.mark.parametrize(
+    ("begins_with", "turns", "expected"),
+    [
+        ("bob", None, []),
+        ("bob", ROBOT, [("open", 2.3), ("interruption", 2.8)]),
+        ("", "bob", [("open", 2.0), ("other", 5.0)]),
+        ("", None, [("open", 2.0), ("interruption", 2.8)]),
+    ],
+)
+def test_who_looks_at_a_neighbor_does_not_hold_the_robot(
+    begins_with: str, turns: str | None, expected: list[tuple[str, float]]
+) -> None:
+    """The robot asks ann from 1 to 5; she speaks from 2 to 7, and may turn her head at 2.3. No words are told."""
+    log = Log("ann", "bob", adjacency_pair_limit=4.0)
+    if begins_with:
+        log.looks("ann", begins_with, 0.5)
+    log.begins(ROBOT, "speak", 1.0, behavior="block-1:speech-1")
+    log.requests_event("adjacency_pair", 1.0, turn="turn-1", responder="ann")
+    log.begins("ann", "speak", 2.0)
+    if turns is not None:
+        log.looks("ann", turns, 2.3)
+    log.until(5.0)
+    log.ends(ROBOT, "speak", 5.0, behavior="block-1:speech-1")
+    log.signals("ended", 5.0)
+    log.until(7.0)
+    log.ends("ann", "speak", 7.0)
+    log.until(20.0)
+
+    told = [each for each in log.effects if isinstance(each, Interjection)]
+    assert [(each.reading, each.at.seconds) for each in told] == expected

@@ -1,6 +1,7 @@
 """People who talk among themselves, and a robot that asks them: what recognition makes of it, by the truth."""
 
 import random
+import re
 from collections import Counter
 from itertools import pairwise
 
@@ -9,6 +10,8 @@ import pytest
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import ActionBegan, Utterance
 from engage_hri.services.simulation.party import NAMES, Party, Saying, ScriptLine
+from engage_hri.services.simulation.party_words import ANY_ANSWER, TALK, answer
+from engage_hri.services.tangram.collaboration.host import QUESTIONS
 from tests.recognition.observations import ROBOT, stamp
 from tests.simulation.party_play import Play
 
@@ -36,7 +39,7 @@ def judged(play: Play) -> Counter[str]:
             said = truth[event.answered_by or event.responder, round(ends[began] + event.delay, 4)]
             found.add(said)
             counted["answers of what was said to others"] += said.to != ROBOT
-    answers = [said for said in play.said if said.kind == "answer"]
+    answers = [said for said in play.said if said.kind == "answer" and said.began < LASTS]
     counted["answers"] = len(answers)
     counted["answers found"] = sum(said in found for said in answers)
     return counted
@@ -58,6 +61,27 @@ def test_what_is_said_to_others_is_not_the_robots_and_its_questions_are_answered
     assert told["to_others"] > 1000
     assert wrong <= (0 if tells else 0.02 * told["to_others"])
     assert told["answers found"] >= (0.95 if tells else 0.9) * told["answers"]
+
+
+def test_what_they_say_fits_what_was_said_to_them() -> None:
+    play = Play(3, 4)
+    play.until(600.0)
+    talk = [said for said in play.said if said.kind in ("talk", "answer")]
+    replies = 0
+    for before, said in pairwise(talk):
+        opened = before.words.rstrip(".").rsplit(", ", 1)[-1]
+        if said.to == before.actor and opened in TALK:
+            assert said.words.rstrip(".").split(", ", 1)[0] in TALK[opened]
+            replies += 1
+
+    assert replies > 40
+
+
+@pytest.mark.parametrize("question", QUESTIONS)
+def test_each_question_of_the_host_has_answers_of_its_own(question: str) -> None:
+    heard = re.sub(r"[^a-z ]", "", f"ann {question}".lower())
+
+    assert answer(heard, random.Random(1)) not in ANY_ANSWER
 
 
 def test_a_seed_gives_the_same_party_and_another_another() -> None:

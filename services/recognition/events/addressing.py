@@ -100,8 +100,10 @@ class OwnSpeech(Spoken, kw_only=True):
     told: Addressees | None = None
     """Addressees by perception."""
     words: str = ""
+    is_into_turn: bool = False
+    """True if it began while the robot had the floor, as far as is known."""
     is_interjected: bool = False
-    """True if it began while the robot had the floor."""
+    """True if it has been told of as such."""
     is_beside: bool = False
     """True if it began while the robot said something to others."""
     may_be_noise: bool = False

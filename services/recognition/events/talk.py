@@ -116,6 +116,7 @@ class Talk(KindRecognizer):
         for speech in self._undecided if self._line else ():
             if speech.until is None:
                 speech.faces.turns(face, at)
+                self._may_interrupt(speech, face, at)
 
     def begins(self, began: ActionBegan, at: Seconds, face: str) -> None:
         action, confidence = began.action, began.confidence
@@ -145,13 +146,19 @@ class Talk(KindRecognizer):
         is_into_turn = is_into_words and is_to_person if self._line else self._conversation.is_into_turn(at)
         is_line = self._scene.lines.get(self.id) == at
         speech.may_be_noise = self._scene.is_worded and not (is_line or speech.is_beside or says_words(speech.words))
-        is_known = self._find(speech, face if is_into_turn else "", at)
-        if is_into_turn and (not is_known or speech.is_to(self._scene.robot)):
-            self._writer.interject(self.id, at, "open", at)
-            speech.is_interjected = True
+        speech.is_into_turn = is_into_turn
+        self._find(speech, face if is_into_turn else "", at)
+        self._may_interrupt(speech, face, at)
         if not self._line:
             self._conversation.listener.next_begins()
         self._queue(at, speech)
+
+    def _may_interrupt(self, speech: OwnSpeech, face: str, at: Seconds) -> None:
+        """Tell of a speech into the robot's turn, unless it is for somebody else, or looks like that."""
+        is_aside = face not in ("", self._scene.robot) if speech.to is None else not speech.is_to(self._scene.robot)
+        if speech.is_into_turn and not speech.is_interjected and not is_aside:
+            self._writer.interject(self.id, speech.since, "open", at)
+            speech.is_interjected = True
 
     def _falls_silent(self, at: Seconds) -> None:
         """Take the end of the speech that goes on."""

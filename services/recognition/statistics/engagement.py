@@ -20,6 +20,8 @@ from engage_hri.services.recognition.config import HYSTERESIS, RecognitionConfig
 from engage_hri.services.recognition.statistics.contact import CONTACT_MEMORY, ContactShare
 from engage_hri.services.recognition.statistics.tally import EventTally
 
+LEVELS: tuple[EngagementLevel, ...] = ("unknown", "disengaged", "engaging", "disengaging", "engaged")
+"""From the least engaged to the most."""
 ENOUGH_EVENTS = 5
 """Number of connection events from which a person's own mean counts; at least 2, since one event has no time between
 events. Ours."""
@@ -98,6 +100,10 @@ class Engagement:
         self.busy_until, self.apart_since, self.level_since = (
             -inf if at is None else at.seconds for at in (former.busy_until, former.contact.ended, former.level_since)
         )
+
+    def is_above(self, other: "Engagement") -> bool:
+        """True if this person is more engaged. Who comes is less so than who drifts away: that one was engaged."""
+        return LEVELS.index(self.estimate.level) > LEVELS.index(other.estimate.level)
 
     def touch(self, much: Probability | None, at: Seconds) -> None:
         """Take how much of a contact there is from `at` on; None: that is not known any longer."""

@@ -135,15 +135,18 @@ class PublishedStatistics:
         for name in (event.person(self._robot), TOGETHER):
             self._actors[name].tally.remember(event)
 
-    def join(self, other: str, kept: str) -> None:
-        """Count the events of a person as those of `kept`, too. The estimate goes on from the one that is newer."""
+    def join(self, other: str, kept: str, now: Seconds) -> None:
+        """Count the events of a person as those of `kept`, too. The estimate goes on from who is the more engaged."""
         if other not in self._actors:
             return
         one = self._actors.pop(other)
         self._agenda.clear(other)
         self._changed.discard(other)
-        if kept in self._actors:
-            one.tally.join(self._actors[kept].tally)
+        if (before := self._actors.get(kept)) is not None:
+            if not one.engagement.is_above(before.engagement):
+                before.engagement.touch(one.engagement.contact.now, now)
+                one, before = before, one
+            one.tally.join(before.tally)
         self._actors[kept] = one
         one.is_new = one.is_urgent = True
         self._changed.add(kept)
