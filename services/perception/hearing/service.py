@@ -32,9 +32,9 @@ from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import Bus, Received, Subscription
 from engage_hri.services.client.people.perceived_person import PerceivedActions, free_seat
 from engage_hri.services.client.people.shared_world import SharedWorld
-from engage_hri.services.perception.hearing.config import HearingConfig
+from engage_hri.services.perception.hearing.config import PAGE, HearingConfig
 from engage_hri.services.perception.hearing.listening import InItsOwn, InThisProcess, Order, Understanding
-from engage_hri.services.perception.hearing.microphone import PAGE, SILENT, SoundLost, is_file, opened
+from engage_hri.services.perception.hearing.microphone import SILENT, SoundLost, is_file, opened
 from engage_hri.services.perception.hearing.own_voice import VAIN, Canceller, CautiousJudge, OwnVoice
 from engage_hri.services.perception.hearing.recognizing import Answer, KnownWords, SpeechWords, settings_of
 from engage_hri.services.perception.hearing.sound import Piece
