@@ -40,7 +40,18 @@ addEventListener("resize", measure);
 
 let shown = null;
 try {
-  const insets = () => ({ top: box.top + (innerWidth > 1.2 * innerHeight ? 8 : Math.min(150, innerHeight * (state.person ? 0.15 : 0.12))), bottom: innerHeight - box.bottom + 14, side: Math.max(10, innerWidth * 0.03) });
+  // The scene has the room that bars, bubbles and the words of the welcome leave: these are above it, or to its left.
+  const insets = () => {
+    const side = Math.max(10, innerWidth * 0.03);
+    const words = at(".welcome").getBoundingClientRect(); // without any size once one sits
+    const isWide = innerWidth > 1.2 * innerHeight;
+    return {
+      top: isWide ? box.top + 8 : words.width ? words.bottom + 16 : box.top + Math.min(150, innerHeight * 0.15),
+      bottom: innerHeight - box.bottom + 14,
+      left: isWide && words.width ? words.right + side : side,
+      right: side,
+    };
+  };
   shown = space(at(".scene"), insets);
 } catch (error) {
   console.warn(error);

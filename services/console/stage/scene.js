@@ -11,6 +11,7 @@ const FROM = { // where the camera stands, from the middle: of somebody at the t
   tall: { seat: [1, 0, 0.78], side: [0.95, 0.62, 0.42] },
 };
 const SEAT = [1.25, 0, 0]; // where somebody would sit
+const FEET = { robot: 0.21, table: 0.21, stool: 0.19, seat: 0.53 }; // metres: how far figures reach on the floor, and how high the seat is
 const LIGHTS = {
   light: { sky: "#ffffff", ground: "#d8c7b0", ambient: 2.0, lamp: "#fff1dc", strength: 2.0, shadow: 0.2, cone: 0.34 },
   dark: { sky: "#8fa6d8", ground: "#241c2b", ambient: 1.1, lamp: "#ffdca8", strength: 2.4, shadow: 0.45, cone: 0.5 },
@@ -52,15 +53,19 @@ export function scene(place, insets) {
   new ResizeObserver(size).observe(place);
 
   const company = () => Boolean(told?.people.some((each) => each.at && each.present));
-  // Everything that has to be in view.
+  // Everything that has to be in view: the table, the robot, and who is there; with a seat that is free all of it, from the floor on.
   function inView() {
     const body = told?.body;
     const top = (body?.eyes ?? [0, 0, 1.17]).map((each) => Math.round(each * 10) / 10); // a head that moves does not move the camera
     const found = [[top[0] - 0.1, top[1], top[2] + 0.15], [0, -0.3, top[2] - 0.25], [0, 0.3, top[2] - 0.25]];
+    const square = ([x, y], far, z) => found.push(...[-far, far].flatMap((a) => [-far, far].map((b) => [x + a, y + b, z])));
     for (const thing of told?.things ?? []) {
-      if (thing.kind === "object") found.push(...[-1, 1].flatMap((x) => [-1, 1].map((y) => [thing.at[0] + x * ROOM, thing.at[1] + y * ROOM, thing.at[2]])));
+      if (thing.kind === "surface") found.push(...thing.outline.map(([x, y]) => [x, y, thing.at[2]]));
+      if (thing.kind === "surface" && !you) square(thing.at, FEET.table, 0);
+      if (thing.kind === "object") square(thing.at, ROOM, thing.at[2]);
     }
-    if (!company()) found.push([SEAT[0] + 0.1, SEAT[1], 0.45]);
+    if (!you) square([0, 0], FEET.robot, 0);
+    if (!you && !company()) for (const z of [0, FEET.seat]) square(SEAT, FEET.stool, z);
     for (const person of told?.people ?? []) {
       if (!person.present || !person.at || person.id === you) continue;
       const [x, y, z] = person.at;
@@ -72,9 +77,9 @@ export function scene(place, insets) {
   // Aim the camera so that all of this is seen between the bars: the middle and the distance, from a direction.
   const goal = { at: eye.at.clone(), far: eye.far };
   function aim(points, direction) {
-    const { top, bottom, side } = insets();
+    const { top, bottom, left: before, right: behind } = insets();
     const { clientWidth: width, clientHeight: height } = place;
-    const box = { left: -1 + (2 * side) / width, right: 1 - (2 * side) / width, top: 1 - (2 * top) / height, bottom: -1 + (2 * bottom) / height };
+    const box = { left: -1 + (2 * before) / width, right: 1 - (2 * behind) / width, top: 1 - (2 * top) / height, bottom: -1 + (2 * bottom) / height };
     const probe = camera.clone();
     const middle = points.reduce((sum, each) => sum.add(each), new THREE.Vector3()).divideScalar(points.length);
     let far = 4;
