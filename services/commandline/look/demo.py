@@ -122,7 +122,11 @@ async def demonstrate(
     tallying = Tallying(began)
     tell = partial(console.print, highlight=False, markup=False)
     async with MemoryHub(config.robot, decodes=False) as hub:
-        beside = windowed(hub, options, began, tell, kiosk=options.kiosk) if window else nullcontext()
+        beside = (
+            windowed(hub, options, began, tell, language=config.hearing.language, kiosk=options.kiosk)
+            if window
+            else nullcontext()
+        )
         with scene_view(console, config.robot, began, live) as show:
             async with beside as shown:
                 hears = options.is_for_visitors and config.control.has_voice and has_hearing()

@@ -154,7 +154,9 @@ async def _talk(
     names = (*ROBOT, *(SENSES if has_hearing() else ()), "simulation")
     async with MemoryHub(config.robot, decodes=False) as hub:
         bus, opens = hub.join("console"), can_open(console.is_terminal)
-        page = partial(windowed, hub, options, began, tell, kiosk=options.kiosk, opens=opens)
+        page = partial(
+            windowed, hub, options, began, tell, language=config.hearing.language, kiosk=options.kiosk, opens=opens
+        )
         with scene_view(console, config.robot, began, live=False) as show:
             async with (
                 following(bus, (show, outputs)),

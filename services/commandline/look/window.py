@@ -137,12 +137,20 @@ async def served(
 
 @asynccontextmanager
 async def windowed(
-    hub: Hub, shown: Shown, began: Seconds, tell: Callable[[str], None], *, kiosk: bool = False, opens: bool = True
+    hub: Hub,
+    shown: Shown,
+    began: Seconds,
+    tell: Callable[[str], None],
+    *,
+    language: str,
+    kiosk: bool = False,
+    opens: bool = True,
 ) -> AsyncIterator["WindowServer"]:
     """Show all that goes on at this hub in the browser, while the body of `async with` runs.
 
     began: the instant from which the page counts its seconds. tell: gets the addresses of stage and workshop.
-    kiosk: the stage begins anew when its visitor has gone. opens: show the stage in the browser.
+    language: of what one says to the robot, as a tag. kiosk: the stage begins anew when its visitor has gone. opens:
+    show the stage in the browser.
     """
     server = web()
     from engage_hri.services.console.web.orders import Script
@@ -151,7 +159,7 @@ async def windowed(
     token, bus = token_of(shown), hub.join(unique_name("console"), "wizard")
     async with window(hub, bus, Script(()), began=began) as following:
         bus.declare_alive()
-        app = server.application(following, hosts(shown), token)
+        app = server.application(following, hosts(shown), token, language)
         stage = stage_page(token) + ("&kiosk" if kiosk else "")
         async with served(
             app,

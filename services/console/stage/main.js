@@ -11,6 +11,7 @@ const TOLD = 4; // seconds for which news of an order are shown
 const at = (what) => document.querySelector(what);
 const asked = new URLSearchParams(location.search);
 const isKiosk = asked.has("kiosk");
+const robotSpeaks = document.body.dataset.language;
 const state = { robot: document.body.dataset.robot, person: "", scene: null, talk: null, text: null, denied: "", link: "" };
 const clock = () => performance.now() / 1000;
 
@@ -58,10 +59,10 @@ try {
   at(".stage").classList.add("flat");
 }
 const touch = shown && hands({ place: at(".scene"), list: at(".pieces"), scene: shown, state, order, bar });
-const heads = atHeads(at(".heads"));
+const heads = atHeads(at(".heads"), robotSpeaks);
 
 function speak() {
-  state.text = texts(spoken);
+  state.text = texts(spoken, robotSpeaks);
   document.documentElement.lang = spoken;
   document.title = state.text.title;
   at("h1").textContent = state.text.title;
@@ -94,7 +95,7 @@ function readOut() {
     if (turn.open || read.has(key)) continue;
     read.add(key);
     const line = document.createElement("p");
-    line.lang = "en";
+    line.lang = robotSpeaks;
     line.textContent = `${turn.actor === state.person ? state.text.you : turn.actor === state.robot ? state.text.robot : turn.actor}: ${turn.words}`;
     at(".read").append(line);
     while (at(".read").children.length > 12) at(".read").firstChild.remove();

@@ -4,6 +4,7 @@ import { keep, makePerson, makePiece, makeRobot, makeStool, placeOf, vector } fr
 
 const SMOOTH = 0.09; // seconds in which a figure comes two thirds nearer to where it is to be
 const SLOW = 45; // ms of a picture above which it gives up shadows and fine dots: without a graphics card
+const LEANS = 0.15; // metres by which a head moves while the robot stays where it is
 const ROOM = 0.1; // metres around a thing that are in view
 const WIDE = 34; // degrees that the camera sees, upright
 const FROM = { // where the camera stands, from the middle: of somebody at the table, and of who looks on
@@ -52,11 +53,13 @@ export function scene(place, insets) {
   };
   new ResizeObserver(size).observe(place);
 
+  let top = [0, 0, 1.17]; // where its eyes are, but for what they do as it nods and leans: that does not move the camera
   const company = () => Boolean(told?.people.some((each) => each.at && each.present));
   // Everything that has to be in view: the table, the robot, and who is there; with a seat that is free all of it, from the floor on.
   function inView() {
     const body = told?.body;
-    const top = (body?.eyes ?? [0, 0, 1.17]).map((each) => Math.round(each * 10) / 10); // a head that moves does not move the camera
+    const eyes = body?.eyes ?? [0, 0, 1.17];
+    if (top.some((each, index) => Math.abs(each - eyes[index]) > LEANS)) top = eyes;
     const found = [[top[0] - 0.1, top[1], top[2] + 0.15], [0, -0.3, top[2] - 0.25], [0, 0.3, top[2] - 0.25]];
     const square = ([x, y], far, z) => found.push(...[-far, far].flatMap((a) => [-far, far].map((b) => [x + a, y + b, z])));
     for (const thing of told?.things ?? []) {
