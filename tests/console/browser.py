@@ -3,6 +3,7 @@
 import asyncio
 import base64
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -131,6 +132,16 @@ class Browser:
                     await page.call("Page.close", 5)
                 listening.cancel()
                 await asyncio.wait([listening])
+
+
+def sound_process(profile: Path) -> int:
+    """Id of the process that has the sound devices of the browser with this profile. Raises LookupError: none has."""
+    for told in Path("/proc").glob("[0-9]*/cmdline"):
+        with suppress(OSError):
+            line = told.read_bytes()
+            if b"--utility-sub-type=audio.mojom.AudioService" in line and os.fsencode(profile) in line:
+                return int(told.parent.name)
+    raise LookupError("the browser has no process for sound")
 
 
 @asynccontextmanager
