@@ -97,9 +97,13 @@ class Page:
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         await self.call("Emulation.setEmulatedMedia", features=[scheme])
 
-    async def picture(self, *, whole: bool = True) -> bytes:
-        """A PNG of the page as it is. whole: also what one has to scroll to."""
-        shot = await self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)
+    async def picture(self, *, whole: bool = True, scale: float = 1.0) -> bytes:
+        """A PNG of the page as it is. whole: also what one has to scroll to. scale: below 1: smaller."""
+        more = {}
+        if scale != 1.0:
+            width, height = await self.value("[innerWidth, innerHeight]")
+            more = {"clip": {"x": 0, "y": 0, "width": width, "height": height, "scale": scale}}
+        shot = await self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole, **more)
         return base64.b64decode(shot["data"])
 
 

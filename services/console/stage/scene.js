@@ -4,6 +4,7 @@ import { keep, makePerson, makePiece, makeRobot, makeStool, placeOf, vector } fr
 
 const SMOOTH = 0.09; // seconds in which a figure comes two thirds nearer to where it is to be
 const SLOW = 45; // ms of a picture above which it gives up shadows and fine dots: without a graphics card
+const OFTEN = 4; // pictures in a row that are slow: the first one or two are slow everywhere
 const LEANS = 0.15; // metres by which a head moves while the robot stays where it is
 const ROOM = 0.1; // metres around a thing that are in view
 const WIDE = 34; // degrees that the camera sees, upright
@@ -42,6 +43,7 @@ export function scene(place, insets) {
   let isStill = false;
   let last = 0;
   let cost = 0; // ms of a picture of late
+  let slow = 0; // pictures in a row that took too long
   const eye = { from: new THREE.Vector3(...FROM.wide.side), at: new THREE.Vector3(0.5, 0, 0.85), far: 4 };
 
   const size = () => {
@@ -49,6 +51,7 @@ export function scene(place, insets) {
     if (!width || !height) return;
     renderer.setSize(width, height);
     camera.aspect = width / height;
+    last = 0; // it is at once where it is to be: a window that changes is no journey
     isStale = true;
   };
   new ResizeObserver(size).observe(place);
@@ -158,8 +161,10 @@ export function scene(place, insets) {
       isStill = turns < 1e-4;
       isStale = moves || turns > 1e-6 || lives;
       renderer.render(world, camera);
-      cost += (performance.now() - began - cost) * 0.1;
-      if (cost > SLOW && renderer.shadowMap.enabled && renderer.info.render.frame > 20) {
+      const took = performance.now() - began;
+      cost += (took - cost) * 0.1;
+      slow = took > SLOW ? slow + 1 : 0;
+      if (slow >= OFTEN && renderer.shadowMap.enabled) {
         renderer.shadowMap.enabled = false;
         renderer.setPixelRatio(1);
         world.traverse((each) => each.material && (each.material.needsUpdate = true));
