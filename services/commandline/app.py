@@ -95,7 +95,8 @@ def command(name: str) -> Any:
             Fault(reason="it needs the tangram", where=f"engage {name}", advice=extra_command("tangram"))
         ) from error
     taken = inspect.signature(module.Options).parameters
-    names = [option for kind in module.Options.__mro__ for option in inspect.get_annotations(kind)]
+    kinds = module.Options.__mro__  # a command may have another default for an option that it shares
+    names = dict.fromkeys(option for kind in kinds for option in inspect.get_annotations(kind))
 
     def run(**given: Any) -> None:
         # Other commands show faults themselves, as they come on the bus.

@@ -8,6 +8,10 @@ from typing import Any
 
 import pytest
 
+from engage_hri.services.commandline.look.demo import FOR_YOU, Options
+from engage_hri.services.commandline.shell.config import Config
+from engage_hri.services.control.voice import player
+from engage_hri.services.control.voice.espeak import EspeakSettings
 from tests.cli.command import Engage
 
 VIRTUAL = ("demo", "--virtual-time")
@@ -144,3 +148,17 @@ def test_people_who_talk_take_the_seat_of_others(engage: Engage) -> None:
 
     assert told.code == 2
     assert "leave it out" in told.err
+
+
+def test_visitors_hear_the_voice_at_their_page_and_no_sound_card_is_needed(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "pacat").write_text("#!/bin/sh\nexit 1\n")
+    (tmp_path / "pacat").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert player.found(EspeakSettings()) is not None
+
+    config = Options(kiosk=True, voice="espeak").read(Config, defaults=FOR_YOU)
+
+    assert config.hearing.source == "page"
+    assert player.found(EspeakSettings(**config.control.drivers["espeak"])) is None

@@ -92,6 +92,14 @@ def test_it_says_plainly_what_to_install(monkeypatch: pytest.MonkeyPatch) -> Non
     ]
 
 
+def test_a_kiosk_has_a_window_also_beside_a_microphone_of_its_own(engage: Engage) -> None:
+    assert talk.Options(kiosk=True, source="parec").has_window
+    assert not talk.Options(source="parec").has_window
+
+    refused = engage("talk", "--kiosk", "--no-window")
+    assert (refused.code, "the seat is in the window" in refused.err) == (2, True)
+
+
 @pytest.mark.real_time
 async def test_a_file_is_heard_and_answered_without_a_window(tmp_path: Path) -> None:
     pytest.importorskip("espeakng_loader", reason="needs the extra `voice`")

@@ -7,12 +7,13 @@ import pytest
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.commandline.robot import up
 from engage_hri.services.commandline.robot.up import Options
+from engage_hri.services.commandline.shell.settings import FROM_PAGES
 
 
 def started(**given: Any) -> tuple[tuple[str, ...], str]:
     """Services that `engage up` starts, and the source that hearing gets."""
     options = Options(**given)
-    config = options.read(up.widest(), defaults=(*up.WITHOUT_TASK, up.FROM_PAGES))
+    config = options.read(up.widest(), defaults=(*up.WITHOUT_TASK, *FROM_PAGES))
     names = tuple(name for names in up._groups(options, config) for name in names)
     line = up.command("hearing", options, config)
     [source] = [part.partition("=")[2] for part in line if part.startswith("hearing.source=")][-1:]

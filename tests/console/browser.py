@@ -3,6 +3,7 @@
 import asyncio
 import base64
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -96,9 +97,13 @@ class Page:
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         await self.call("Emulation.setEmulatedMedia", features=[scheme])
 
-    async def picture(self, *, whole: bool = True) -> bytes:
-        """A PNG of the page as it is. whole: also what one has to scroll to."""
-        shot = await self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)
+    async def picture(self, *, whole: bool = True, scale: float = 1.0) -> bytes:
+        """A PNG of the page as it is. whole: also what one has to scroll to. scale: below 1: smaller."""
+        more = {}
+        if scale != 1.0:
+            width, height = await self.value("[innerWidth, innerHeight]")
+            more = {"clip": {"x": 0, "y": 0, "width": width, "height": height, "scale": scale}}
+        shot = await self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole, **more)
         return base64.b64decode(shot["data"])
 
 
@@ -131,6 +136,16 @@ class Browser:
                     await page.call("Page.close", 5)
                 listening.cancel()
                 await asyncio.wait([listening])
+
+
+def sound_process(profile: Path) -> int:
+    """Id of the process that has the sound devices of the browser with this profile. Raises LookupError: none has."""
+    for told in Path("/proc").glob("[0-9]*/cmdline"):
+        with suppress(OSError):
+            line = told.read_bytes()
+            if b"--utility-sub-type=audio.mojom.AudioService" in line and os.fsencode(profile) in line:
+                return int(told.parent.name)
+    raise LookupError("the browser has no process for sound")
 
 
 @asynccontextmanager

@@ -12,7 +12,11 @@ from tests.console.windows import URL, engage
 FOLDER = Path(__file__).parents[2] / "docs" / "console"
 PLACE = 27.5
 """Place in the recording, in seconds: the robot points."""
-STAGES = (("phone", (390, 844), False), ("laptop", (1366, 768), False), ("dark", (390, 844), True))
+STAGES = (
+    ("phone", (390, 844), False, 1.0), ("tablet", (820, 1180), False, 0.5), ("laptop", (1366, 768), False, 1.0),
+    ("wall", (1920, 1080), False, 0.5), ("dark", (390, 844), True, 1.0),
+)  # fmt: skip
+"""Name, size, whether it is dark, and how large the picture is of what is seen."""
 SIZES = ((1920, 1200), (1280, 1000), (400, 1400))
 
 
@@ -57,11 +61,11 @@ async def take_stage(url: str, port: int) -> None:
         await page.until("window.stage?.state.scene?.body && window.stage.shown.isStill", 60)
         (FOLDER / "stage-welcome.png").write_bytes(await page.picture(whole=False))
         await page.value("document.querySelector('.sit').click()")
-        for name, (width, height), dark in STAGES:
+        for name, (width, height), dark, scale in STAGES:
             await page.look(width, height, dark=dark)
             await page.until("document.querySelectorAll('.bubble.robot.on span').length > 4", 60)
             await page.value("new Promise((done) => setTimeout(done, 1500))")
-            (FOLDER / f"stage-{name}.png").write_bytes(await page.picture(whole=False))
+            (FOLDER / f"stage-{name}.png").write_bytes(await page.picture(whole=False, scale=scale))
 
 
 def main() -> None:

@@ -142,8 +142,8 @@ def _is_final(message: dict[str, Any]) -> bool:
 
 
 def _said_by_the_robot(told: list[dict[str, Any]]) -> str:
-    spoken = [each for message in told if message["type"] == "fragment_outcome" for each in message.get("spoken", ())]
-    return plain(" ".join(each["text"] for each in spoken))
+    outcomes = {message["fragment"]: message for message in told if message["type"] == "fragment_outcome"}
+    return plain(" ".join(each["text"] for told in outcomes.values() for each in told.get("spoken", ())))
 
 
 def _exchanges(phrases: tuple[str, ...], told: list[dict[str, Any]], begin: float, sound: Samples) -> list[Exchange]:

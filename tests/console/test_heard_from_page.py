@@ -207,3 +207,21 @@ async def test_a_microphone_that_goes_off_ends_the_speech_at_once(place: HeardPl
         await talk.page.value(how)
         await talk.comes(ActionEnded, 1.0, since)
         assert talk.of(Fault, since) == []
+
+
+async def test_a_microphone_that_is_unplugged_ends_the_speech_is_told_in_words_and_can_be_on_again(
+    place: HeardPlace,
+) -> None:
+    """The browser's process for sound is killed: that is what a page sees of a device that is pulled out."""
+    async with talking(place) as talk:
+        since = await talk.speaks()
+        os.kill(browser.sound_process(place.profile), signal.SIGKILL)
+        await talk.page.until("document.querySelector('.microphone .why').textContent.includes('unplugged')", 2.0)
+        await talk.comes(ActionEnded, 2.0, since)
+        assert talk.of(Fault, since) == []
+        assert await talk.page.value("document.querySelector('#microphone').getAttribute('aria-pressed')") == "false"
+
+        since = len(talk.told)
+        await press(talk.page, "#microphone")
+        await talk.page.until("document.querySelector('#microphone.light')", 10)
+        await talk.comes(ActionBegan, 20.0, since)

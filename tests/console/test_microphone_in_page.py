@@ -151,6 +151,27 @@ async def test_what_the_microphone_hears_comes_to_the_bus_with_its_instants(plac
     assert np.median(waits) < 0.15
 
 
+BUSY = """void (window.busy = setInterval(() => {
+  const until = performance.now() + 400;
+  while (performance.now() < until);
+}, 450))"""
+
+
+async def test_a_page_that_is_busy_keeps_no_sound_back(place: HeardPlace) -> None:
+    async with sitting(place) as one:
+        await one.press()
+        await one.is_on()
+        await one.page.value(BUSY)
+        await one.got(len(one.frames) + 30)
+        since = len(one.frames)
+        await one.got(since + 150)
+        waits = [came - one.bus.local(frame.at) - 512 / RATE for came, frame in one.frames[since:]]
+        await one.page.value("clearInterval(window.busy)")
+
+    print(np.quantile(waits, (0.5, 0.75, 0.9, 1.0)).round(3))
+    assert np.quantile(waits, 0.75) < 0.15
+
+
 KEEP = """
 const asked = navigator.mediaDevices.getUserMedia.bind(navigator.mediaDevices);
 navigator.mediaDevices.getUserMedia = async (...what) => (window.stream = await asked(...what));

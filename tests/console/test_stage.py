@@ -34,6 +34,15 @@ OUTSIDE = """[...document.querySelectorAll('button, input, .hint, .bubble.on, .w
   .filter(([, box]) => box.left < 0 || box.top < 0 || box.right > innerWidth || box.bottom > innerHeight)
   .map(([each]) => each.className)"""
 """What one would have to scroll to."""
+CUT = """(({ scene, person }, { onPage }, box) => [
+  ...scene.things.filter(({ kind }) => kind === "surface")
+    .flatMap(({ at, outline }) => outline.map(([x, y]) => [x, y, at[2]])),
+  [scene.body.eyes[0], scene.body.eyes[1], scene.body.eyes[2] + 0.12],
+  ...(person ? [] : [[-0.2, 0, 0], [0, 0.2, 0], [1.43, 0, 0], [1.25, 0.18, 0], [1.25, -0.18, 0.5]]),
+].map(onPage).filter(({ x, y }) => x < 0 || x > box.width || y < 0 || y > box.bottom)
+)(window.stage.state, window.stage.shown, window.stage.box)"""
+"""Places of the table's edge, the robot and the free seat that the page does not show."""
+CALM = [{"name": "prefers-reduced-motion", "value": "reduce"}]
 SCROLLS = """(({ scrollHeight, scrollWidth }) => scrollY + scrollHeight - innerHeight + scrollWidth - innerWidth
 )(document.documentElement)"""
 LATER = """void ((by) => {
@@ -231,10 +240,10 @@ async def test_all_that_touch_does_the_keyboard_does_and_it_leads_out_of_everyth
 @needs_browser
 async def test_a_visitor_sees_words_in_their_language_and_changes_it_at_one_touch(place: Place) -> None:
     async with opened(place, language="de-AT") as page:
-        assert await page.value("[document.documentElement.lang, document.querySelector('.hello').textContent]") == [
-            "de",
-            "Hallo!",
-        ]
+        words = "['.hello', '.what'].map((each) => document.querySelector(each).textContent)"
+        language, hello, what = await page.value(f"[document.documentElement.lang, ...{words}]")
+        assert (language, hello) == ("de", "Hallo!")
+        assert what.endswith("Der Roboter schaut zurück. Er spricht Englisch.")
         await press(page, ".other")
         await page.until(
             "document.documentElement.lang === 'en' && document.querySelector('.hello').textContent === 'Hello!'"
@@ -246,10 +255,16 @@ async def test_a_visitor_sees_words_in_their_language_and_changes_it_at_one_touc
         same = """import('./stage/words.js').then(({ texts }) => {
           const form = (all) => Object.entries(all).map(([key, text]) => `${key} ${typeof text} ${text.length}`);
           const kinds = (all) => form(all).map((each) => (each.includes("object") ? each : each.split(" ")[0]));
-          const [one, other] = [kinds(texts("en")), kinds(texts("de"))];
+          const [one, other] = [kinds(texts("en", "en")), kinds(texts("de", "en"))];
           return one.filter((each) => !other.includes(each)).concat(other.filter((each) => !one.includes(each)));
         })"""
         assert await page.value(same) == []
+        german = """import('./stage/words.js').then(({ texts }) => ["en", "de"].map((name) => texts(name, "de-AT"))
+          .map((all) => [all.type, all.quick[1].slice(0, 2), all.welcome.split(". ").at(-1)]))"""
+        assert await page.value(german) == [
+            ["Say something in German", ["Yes", "Ja."], "It speaks German."],
+            ["Sag etwas", ["Ja", "Ja."], "Der Roboter schaut zurück."],
+        ]
 
 
 @needs_browser
@@ -344,6 +359,9 @@ async def test_it_fits_every_screen_without_scrolling(place: Place) -> None:
                 assert await page.value(SCROLLS) == 0
                 assert await page.value(TOO_SMALL) == []
                 assert await page.value(OUTSIDE) == [], (width, height)
+                await page.call("Emulation.setEmulatedMedia", features=CALM)  # the camera is at once where it goes
+                await page.until("window.stage.shown.isStill")
+                assert await page.value(CUT) == [], (width, height)
             await page.look(*PHONE)
 
 

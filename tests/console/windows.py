@@ -31,12 +31,13 @@ def engage(told: Path, *arguments: str, **settings: str) -> Iterator["subprocess
 
 
 class HeardPlace(NamedTuple):
-    """A window, and a browser whose microphone hears a file. process: id of the window's."""
+    """A window, and a browser whose microphone hears a file. process: id of the window's. profile: the browser's."""
 
     endpoint: str
     url: str
     port: int
     process: int
+    profile: Path
 
 
 def hears(file: Path, *, once: bool = False) -> tuple[str, ...]:
@@ -60,4 +61,5 @@ def heard_place(folder: Path, file: Path, *robot: str) -> Iterator[HeardPlace]:
         browser.running(folder / "browser", *hears(file)) as port,
     ):
         browser.waited(up, folder / "up", rb"(all services are up)")
-        yield HeardPlace(endpoint, browser.waited(console, folder / "console", URL), port, console.pid)
+        url, profile = browser.waited(console, folder / "console", URL), folder / "browser" / "profile"
+        yield HeardPlace(endpoint, url, port, console.pid, profile)

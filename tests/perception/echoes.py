@@ -19,7 +19,7 @@ from engage_hri.schemas.sound import SoundFrame
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.voice.outlets import PIECE, SOON
-from engage_hri.services.perception.hearing.service import LOOK_AROUND
+from engage_hri.services.perception.hearing.intake import LOOK_AROUND
 from engage_hri.services.perception.hearing.voice import RATE, Samples
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.perception.spoken import FAINT, PHRASES, pink, voice

@@ -21,12 +21,14 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.people.perceive import perceive
 from engage_hri.services.commandline.embedding import EmbeddedRobot
-from engage_hri.services.perception.hearing import service
+from engage_hri.services.perception.hearing import device
 from engage_hri.services.perception.hearing.config import HearingConfig
+from engage_hri.services.perception.hearing.intake import LOOK_AROUND
 from engage_hri.services.perception.hearing.microphone import SoundLost
 from engage_hri.services.perception.hearing.recognizing import Listening, SpeechRecognizer, SpeechWords
-from engage_hri.services.perception.hearing.service import LOOK_AROUND, VISITOR, hear
+from engage_hri.services.perception.hearing.service import hear
 from engage_hri.services.perception.hearing.sound import Piece
+from engage_hri.services.perception.hearing.speeches import VISITOR
 from engage_hri.services.perception.hearing.voice import RATE
 from engage_hri.services.runtime.service import Ready, Service, running
 from tests.perception.spoken import PHRASES, placed, spoken, voice, write_wav
@@ -233,7 +235,7 @@ async def test_a_microphone_that_goes_ends_the_speech_is_told_once_and_tried_aga
             yield Piece(said[at : at + 320, None], loop.time() - 0.02)
         raise SoundLost(Fault(reason="the microphone is gone"))
 
-    monkeypatch.setattr(service, "opened", lambda source, channels: recorded)
+    monkeypatch.setattr(device, "opened", lambda source, channels: recorded)
     async with hearing(hub, source="arecord") as heard:
         await asyncio.sleep(8.5)
 

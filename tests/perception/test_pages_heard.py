@@ -16,7 +16,7 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.people.perceive import perceive
 from engage_hri.services.perception.hearing.microphone import SILENT
-from engage_hri.services.perception.hearing.service import MOST_PAGES
+from engage_hri.services.perception.hearing.pages import MOST_PAGES
 from engage_hri.services.perception.hearing.voice import RATE, Samples
 from tests.perception.spoken import placed, spoken, voice
 from tests.perception.test_hearing import Heard, hearing, sphinx

@@ -15,13 +15,13 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline.embedding import play_tangram
-from engage_hri.services.commandline.look.window import can_open, web, windowed
+from engage_hri.services.commandline.look.window import can_open, seat_refusal, web, windowed
 from engage_hri.services.commandline.shell.config import Config
-from engage_hri.services.commandline.shell.options import Embodied, Shown, Simulated, VirtualTime, Written
+from engage_hri.services.commandline.shell.options import Embodied, Kiosk, Shown, Simulated, VirtualTime, Written
 from engage_hri.services.commandline.shell.outputs import Outputs
 from engage_hri.services.commandline.shell.process import DONE, run
 from engage_hri.services.commandline.shell.recording_file import needed
-from engage_hri.services.commandline.shell.settings import TRANSCRIPT
+from engage_hri.services.commandline.shell.settings import AT_PAGES, TRANSCRIPT
 from engage_hri.services.console.follow import Sink
 from engage_hri.services.console.terminal import tally
 from engage_hri.services.console.terminal.live import Tallying, scene_view
@@ -30,7 +30,7 @@ from engage_hri.services.runtime.installation import has_hearing
 if TYPE_CHECKING:
     from engage_hri.services.console.web.service import WindowServer
 
-FOR_YOU = ("collaboration.mode=task", "hearing.source=page")
+FOR_YOU = ("collaboration.mode=task", *AT_PAGES)
 """Settings for somebody who knows no transcript: the robot says good of what is right, and sees which piece it is."""
 EMPTY: Seconds = 5.0
 """Time without anybody before the robot after which a kiosk begins anew."""
@@ -52,14 +52,7 @@ class Options(Written, Simulated, Embodied, Shown):
     you: Annotated[
         bool, typer.Option("--you", help="You are the person: take the seat in the browser, and lay the pieces.")
     ] = False
-    kiosk: Annotated[
-        bool,
-        typer.Option(
-            "--kiosk",
-            help="For an open day: as --you, again and again. The page begins anew for the next visitor by itself.",
-        ),
-    ] = False
-
+    kiosk: Kiosk = False
     people: Annotated[
         int | None,
         typer.Option(
@@ -112,9 +105,7 @@ def _check(options: Options) -> None:
             raise InputRefused(Fault(reason=reason, where=option, advice=advice))
     for option, given in (("--you", options.you), ("--kiosk", options.kiosk)):
         if given and options.window is False:
-            raise InputRefused(
-                Fault(reason="the seat is in the window", where=option, advice="leave out --no-window")
-            )
+            raise seat_refusal(option)
     if options.kiosk and options.record is not None:
         reason, advice = "what strangers do there is in no recording", "leave it out"
         raise InputRefused(Fault(reason=reason, where="--record", advice=advice))
@@ -131,7 +122,11 @@ async def demonstrate(
     tallying = Tallying(began)
     tell = partial(console.print, highlight=False, markup=False)
     async with MemoryHub(config.robot, decodes=False) as hub:
-        beside = windowed(hub, options, began, tell, kiosk=options.kiosk) if window else nullcontext()
+        beside = (
+            windowed(hub, options, began, tell, language=config.hearing.language, kiosk=options.kiosk)
+            if window
+            else nullcontext()
+        )
         with scene_view(console, config.robot, began, live) as show:
             async with beside as shown:
                 hears = options.is_for_visitors and config.control.has_voice and has_hearing()

@@ -24,17 +24,16 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline.embedding import services
-from engage_hri.services.commandline.look.window import can_open, web, windowed
+from engage_hri.services.commandline.look.window import can_open, seat_refusal, web, windowed
 from engage_hri.services.commandline.shell.failing_output import LOG, complain
-from engage_hri.services.commandline.shell.options import Embodied, Hearing, Shown, Written
+from engage_hri.services.commandline.shell.options import Embodied, Hearing, Kiosk, Shown, Written
 from engage_hri.services.commandline.shell.outputs import Outputs
 from engage_hri.services.commandline.shell.process import DONE, run_until_signal
 from engage_hri.services.commandline.shell.roster import ROBOT, SENSES, complete
-from engage_hri.services.commandline.shell.settings import RobotConfig
+from engage_hri.services.commandline.shell.settings import AT_PAGES, RobotConfig
 from engage_hri.services.console.follow import following
 from engage_hri.services.console.terminal.live import scene_view
 from engage_hri.services.control.bases.error_place import seen_at, words_of
-from engage_hri.services.perception.hearing.microphone import PAGE
 from engage_hri.services.runtime.installation import extra_command, has_hearing
 from engage_hri.services.runtime.service import running
 
@@ -60,6 +59,12 @@ class Options(Written, Embodied, Hearing, Shown):
     window: Annotated[
         bool | None, typer.Option(help="Talk in the browser; with --from it is not.", show_default=False)
     ] = None
+    kiosk: Kiosk = False
+
+    @property
+    def has_window(self) -> bool:
+        """True if one talks in the browser."""
+        return (self.kiosk or self.source is None) if self.window is None else self.window
 
 
 @dataclass(frozen=True)
@@ -72,16 +77,17 @@ class ManagerFile:
 
 def main(options: Options) -> int:
     """Talk until a signal, or until the file that is heard is over."""
+    if options.kiosk and not options.has_window:
+        raise seat_refusal("--kiosk")
     manager = read_manager(options.manager)
-    has_window = options.source is None if options.window is None else options.window
-    config = options.read(complete(), defaults=tuple(_defaults(manager, has_window)))
+    config = options.read(complete(), defaults=tuple(_defaults(manager, options.has_window)))
     for lack in _lacks(config):
         complain(lack)
-    if has_window:
+    if options.has_window:
         web()
     with Outputs(options.events, options.feedback) as outputs:
         console = outputs.console(quiet=options.quiet)
-        run_until_signal(_talk(config, manager, outputs, console, options if has_window else None))
+        run_until_signal(_talk(config, manager, outputs, console, options))
     return DONE
 
 
@@ -123,8 +129,7 @@ def _defaults(manager: ManagerFile, has_window: bool) -> Iterator[str]:
     if _has("espeakng_loader"):
         yield "control.voice=espeak"
     if has_window:
-        yield "control.drivers.espeak.device=none"
-        yield f"hearing.source={PAGE}"
+        yield from AT_PAGES
     if _has("pocketsphinx") and manager.phrases:
         yield "hearing.recognizer=sphinx"
         yield f"hearing.phrases={json.encode(manager.phrases).decode()}"
@@ -141,18 +146,21 @@ def _lacks(config: RobotConfig) -> Iterator[str]:
 
 
 async def _talk(
-    config: RobotConfig, manager: ManagerFile, outputs: Outputs, console: Console, shown: Options | None
+    config: RobotConfig, manager: ManagerFile, outputs: Outputs, console: Console, options: Options
 ) -> None:
-    """Run all services and the manager on a bus in memory. shown: options of the window; None: there is none."""
+    """Run all services and the manager on a bus in memory."""
     began = asyncio.get_running_loop().time()
     tell = partial(console.print, highlight=False, markup=False, soft_wrap=True)
     names = (*ROBOT, *(SENSES if has_hearing() else ()), "simulation")
     async with MemoryHub(config.robot, decodes=False) as hub:
-        bus = hub.join("console")
+        bus, opens = hub.join("console"), can_open(console.is_terminal)
+        page = partial(
+            windowed, hub, options, began, tell, language=config.hearing.language, kiosk=options.kiosk, opens=opens
+        )
         with scene_view(console, config.robot, began, live=False) as show:
             async with (
                 following(bus, (show, outputs)),
-                windowed(hub, shown, began, tell, opens=can_open(console.is_terminal)) if shown else nullcontext(),
+                page() if options.has_window else nullcontext(),
                 running(hub, services(config, *names)) as over,
                 connect(hub=hub, name="manager") as robot,
             ):

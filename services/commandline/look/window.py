@@ -2,12 +2,15 @@
 
 import errno
 import os
+import re
 import secrets
 import sys
 import webbrowser
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from functools import partial
 from importlib.util import find_spec
+from pathlib import Path
 from socket import AF_INET, AF_INET6, SOCK_DGRAM, gethostname, socket
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -54,6 +57,11 @@ def web() -> ModuleType:
     return server
 
 
+def seat_refusal(option: str) -> InputRefused:
+    """Error of an option for whoever sits at the page, where there is none."""
+    return InputRefused(Fault(reason="the seat is in the window", where=option, advice="leave out --no-window"))
+
+
 def names(shown: Shown) -> tuple[str, ...]:
     """Names by which the page may be called."""
     own = gethostname()
@@ -87,7 +95,6 @@ async def served(
     tell: Callable[[str], None],
     *,
     role: str,
-    port: int = 0,
     opens: bool = True,
 ) -> AsyncIterator[None]:
     """Serve pages while the body of `async with` runs.
@@ -95,18 +102,18 @@ async def served(
     Raises RunFailed if the port is taken, and InputRefused if there is no certificate where `--https` says.
 
     pages: the address of each below the server's, and what is said before it. tell: gets a line for each.
-    role: of whoever has the token. port: 0: any that is free. opens: show the first in the browser.
+    role: of whoever has the token. opens: show the first in the browser.
     """
     keys = server_keys(shown.https, names(shown)) if shown.https else None
     async with AsyncExitStack() as stack:
         try:
-            port = await stack.enter_async_context(web().serving(app, shown.host, port, keys))
+            port = await stack.enter_async_context(web().serving(app, shown.host, shown.port, keys))
         except OSError as error:
             is_taken = error.errno == errno.EADDRINUSE
             free = "is another window there? --port 0 takes any that is free"
             advice = free if is_taken else "--host takes an address of this machine"
             reason = os.strerror(error.errno) if error.errno else str(error)
-            raise RunFailed(Fault(reason=reason, where=f"{shown.host}:{port}", advice=advice)) from error
+            raise RunFailed(Fault(reason=reason, where=f"{shown.host}:{shown.port}", advice=advice)) from error
         other = outward(shown.host)
         home, abroad = (
             f"http{'s' if keys else ''}://{f'[{host}]' if ':' in host else host}:{port}/"
@@ -130,21 +137,29 @@ async def served(
 
 @asynccontextmanager
 async def windowed(
-    hub: Hub, shown: Shown, began: Seconds, tell: Callable[[str], None], *, kiosk: bool = False, opens: bool = True
+    hub: Hub,
+    shown: Shown,
+    began: Seconds,
+    tell: Callable[[str], None],
+    *,
+    language: str,
+    kiosk: bool = False,
+    opens: bool = True,
 ) -> AsyncIterator["WindowServer"]:
     """Show all that goes on at this hub in the browser, while the body of `async with` runs.
 
     began: the instant from which the page counts its seconds. tell: gets the addresses of stage and workshop.
-    kiosk: the stage begins anew when its visitor has gone. opens: show the stage in the browser.
+    language: of what one says to the robot, as a tag. kiosk: the stage begins anew when its visitor has gone. opens:
+    show the stage in the browser.
     """
     server = web()
     from engage_hri.services.console.web.orders import Script
     from engage_hri.services.console.web.service import window
 
-    token, bus = secrets.token_urlsafe(TOKEN), hub.join(unique_name("console"), "wizard")
+    token, bus = token_of(shown), hub.join(unique_name("console"), "wizard")
     async with window(hub, bus, Script(()), began=began) as following:
         bus.declare_alive()
-        app = server.application(following, hosts(shown), token)
+        app = server.application(following, hosts(shown), token, language)
         stage = stage_page(token) + ("&kiosk" if kiosk else "")
         async with served(
             app,
@@ -155,6 +170,31 @@ async def windowed(
             opens=opens,
         ):
             yield following
+
+
+def token_of(shown: Shown) -> str:
+    """The token of the address: that in `--token-file`, or else a new one."""
+    return secrets.token_urlsafe(TOKEN) if shown.token_file is None else kept_token(shown.token_file)
+
+
+def kept_token(path: Path) -> str:
+    """The token in a file, which is made for its owner alone if there is none. Raises InputRefused.
+
+    On the command line, every user of the machine could read it.
+    """
+    try:
+        with suppress(FileExistsError), open(path, "x", opener=partial(os.open, mode=0o600)) as file:
+            file.write(f"{secrets.token_urlsafe(TOKEN)}\n")
+        token, mode = path.read_text(encoding="utf-8").strip(), path.stat().st_mode
+    except (OSError, UnicodeDecodeError) as error:
+        reason = f"cannot be read or made: {getattr(error, 'strerror', None) or error}"
+        raise InputRefused(Fault(reason=reason, where=str(path))) from error
+    if os.name == "posix" and mode & 0o077:
+        raise InputRefused(Fault(reason="others may read it", where=str(path), advice=f"chmod 600 {path}"))
+    if not re.fullmatch(r"[\w-]{12,}", token, re.ASCII):
+        reason = "this is no token: at least 12 letters, digits, - and _, on one line"
+        raise InputRefused(Fault(reason=reason, where=str(path), advice="name a new file, and it is made"))
+    return token
 
 
 def workshop_page(token: str) -> str:

@@ -24,7 +24,7 @@ from engage_hri.services.commandline.shell.options import Embodied, Hearing, Lis
 from engage_hri.services.commandline.shell.outputs import Outputs
 from engage_hri.services.commandline.shell.process import DONE, run_until_signal
 from engage_hri.services.commandline.shell.roster import ROBOT, SENSES, TASK, Groups, complete, groups, widest
-from engage_hri.services.commandline.shell.settings import ELSEWHERE, TRANSCRIPT, RobotConfig
+from engage_hri.services.commandline.shell.settings import ELSEWHERE, FROM_PAGES, TRANSCRIPT, RobotConfig
 from engage_hri.services.commandline.shell.supervisor import Child, supervised
 from engage_hri.services.console.follow import Sink, following
 from engage_hri.services.console.terminal import tally
@@ -38,8 +38,6 @@ NAME = "up"
 """Name on the bus: of two of a robot, as of two services of one name, one goes on."""
 WITHOUT_TASK = ("simulation.human=attentive",)
 """Setting without the task: a person who reacts to the robot."""
-FROM_PAGES = "hearing.source=page"
-"""Setting of the ears that come with a voice: whoever sits at a page may switch a microphone on."""
 ALL_UP = "all services are up; Ctrl-C stops them"
 STYLES = ("cyan", "magenta", "green", "yellow", "blue", "red")
 
@@ -63,7 +61,7 @@ class Options(Written, Simulated, Embodied, Hearing, Listening):
 def main(options: Options) -> int:
     # A bad configuration is refused here, and not by every child.
     kind = complete() if options.task else widest()
-    config = options.read(kind, defaults=(*(TRANSCRIPT if options.task else WITHOUT_TASK), FROM_PAGES))
+    config = options.read(kind, defaults=(*(TRANSCRIPT if options.task else WITHOUT_TASK), *FROM_PAGES))
     drivers.check(config.control)
     grouped = _groups(options, config)
     with Outputs(options.events, options.feedback) as outputs:

@@ -29,6 +29,10 @@ Resolution = Annotated[
 Strict = Annotated[bool, typer.Option("--strict", help="Exit 2 if there was any warning.")]
 VirtualTime = Annotated[bool, typer.Option("--virtual-time", help="As fast as it goes, on a clock that jumps.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+Port = Annotated[int, typer.Option(metavar="PORT", min=0, max=65535, help="Port of the page; 0: any that is free.")]
+Kiosk = Annotated[
+    bool, typer.Option("--kiosk", help="For an open day: the page begins anew for each next visitor by itself.")
+]
 WorldFile = Annotated[
     Path | None,
     typer.Option("--world", metavar="FILE", help="JSON of the entities; without it a table with ten pieces."),
@@ -233,6 +237,16 @@ class Shown:
             metavar="FILE",
             help="Speak TLS, with the certificate and the key in this file, which is made if there is none, or in "
             "the folder of a router's keys: browsers give a microphone to https, and to this machine, only.",
+            show_default=False,
+        ),
+    ] = None
+    port: Port = 0
+    token_file: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="File with the token of the address, made if there is none: then the address stays the same when "
+            "the window is started again, and its pages take part as before.",
             show_default=False,
         ),
     ] = None

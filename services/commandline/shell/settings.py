@@ -7,7 +7,7 @@ from engage_hri.schemas.world import COVERED_FOR
 from engage_hri.services.bus.config import BusConfig
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.perception.hearing.config import HearingConfig
+from engage_hri.services.perception.hearing.config import PAGE, HearingConfig
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.recognition.config import RecognitionConfig
 
@@ -16,6 +16,11 @@ ELSEWHERE = ("simulation", "collaboration")
 TRANSCRIPT = ("recognition.gaze_resolution=table",)
 """Settings for the transcript of the tangram: its annotators saw that a look went to the table, but rarely to which
 piece."""
+FROM_PAGES = (f"hearing.source={PAGE}",)
+"""Settings of ears for whoever sits at a page, and may switch a microphone on there."""
+AT_PAGES = (*FROM_PAGES, "control.drivers.espeak.device=none")
+"""Settings of a robot that is talked with at pages: they have its voice as well. Two loudspeakers at one table are an
+echo, and a machine without a sound card has none."""
 
 
 class RobotConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -6,7 +6,8 @@ const EACH = 0.28; // and for each word
 const GAP = 8; // pixels between two bubbles, and to the edge
 const NEWEST = 26; // words that a bubble shows at most: of a long turn the newest
 
-export function heads(overlay) {
+// spoken: the language of what is said, as a tag.
+export function heads(overlay, spoken) {
   const bubbles = new Map(); // by actor: the newest turn only
   const names = new Map();
 
@@ -29,7 +30,7 @@ export function heads(overlay) {
     const same = words.findIndex((word, index) => known.words[index] !== word);
     const from = same < 0 ? words.length : same;
     for (const node of [...known.text.children].slice(from)) node.remove();
-    for (const word of words.slice(from)) known.text.append(element("span", { lang: "en" }, `${word} `));
+    for (const word of words.slice(from)) known.text.append(element("span", { lang: spoken }, `${word} `));
     known.words = words;
     [...known.text.children].forEach((node, index) => (node.hidden = words.length - index > NEWEST));
     known.text.classList.toggle("long", words.length > NEWEST);

@@ -11,6 +11,7 @@ const TOLD = 4; // seconds for which news of an order are shown
 const at = (what) => document.querySelector(what);
 const asked = new URLSearchParams(location.search);
 const isKiosk = asked.has("kiosk");
+const robotSpeaks = document.body.dataset.language;
 const state = { robot: document.body.dataset.robot, person: "", scene: null, talk: null, text: null, denied: "", link: "" };
 const clock = () => performance.now() / 1000;
 
@@ -40,17 +41,28 @@ addEventListener("resize", measure);
 
 let shown = null;
 try {
-  const insets = () => ({ top: box.top + (innerWidth > 1.2 * innerHeight ? 8 : Math.min(150, innerHeight * (state.person ? 0.15 : 0.12))), bottom: innerHeight - box.bottom + 14, side: Math.max(10, innerWidth * 0.03) });
+  // The scene has the room that bars, bubbles and the words of the welcome leave: these are above it, or to its left.
+  const insets = () => {
+    const side = Math.max(10, innerWidth * 0.03);
+    const words = at(".welcome").getBoundingClientRect(); // without any size once one sits
+    const isWide = innerWidth > 1.2 * innerHeight;
+    return {
+      top: isWide ? box.top + 8 : words.width ? words.bottom + 16 : box.top + Math.min(150, innerHeight * 0.15),
+      bottom: innerHeight - box.bottom + 14,
+      left: isWide && words.width ? words.right + side : side,
+      right: side,
+    };
+  };
   shown = space(at(".scene"), insets);
 } catch (error) {
   console.warn(error);
   at(".stage").classList.add("flat");
 }
 const touch = shown && hands({ place: at(".scene"), list: at(".pieces"), scene: shown, state, order, bar });
-const heads = atHeads(at(".heads"));
+const heads = atHeads(at(".heads"), robotSpeaks);
 
 function speak() {
-  state.text = texts(spoken);
+  state.text = texts(spoken, robotSpeaks);
   document.documentElement.lang = spoken;
   document.title = state.text.title;
   at("h1").textContent = state.text.title;
@@ -83,7 +95,7 @@ function readOut() {
     if (turn.open || read.has(key)) continue;
     read.add(key);
     const line = document.createElement("p");
-    line.lang = "en";
+    line.lang = robotSpeaks;
     line.textContent = `${turn.actor === state.person ? state.text.you : turn.actor === state.robot ? state.text.robot : turn.actor}: ${turn.words}`;
     at(".read").append(line);
     while (at(".read").children.length > 12) at(".read").firstChild.remove();

@@ -4,6 +4,8 @@ import { keep, makePerson, makePiece, makeRobot, makeStool, placeOf, vector } fr
 
 const SMOOTH = 0.09; // seconds in which a figure comes two thirds nearer to where it is to be
 const SLOW = 45; // ms of a picture above which it gives up shadows and fine dots: without a graphics card
+const OFTEN = 4; // pictures in a row that are slow: the first one or two are slow everywhere
+const LEANS = 0.15; // metres by which a head moves while the robot stays where it is
 const ROOM = 0.1; // metres around a thing that are in view
 const WIDE = 34; // degrees that the camera sees, upright
 const FROM = { // where the camera stands, from the middle: of somebody at the table, and of who looks on
@@ -11,6 +13,7 @@ const FROM = { // where the camera stands, from the middle: of somebody at the t
   tall: { seat: [1, 0, 0.78], side: [0.95, 0.62, 0.42] },
 };
 const SEAT = [1.25, 0, 0]; // where somebody would sit
+const FEET = { robot: 0.21, table: 0.21, stool: 0.19, seat: 0.53 }; // metres: how far figures reach on the floor, and how high the seat is
 const LIGHTS = {
   light: { sky: "#ffffff", ground: "#d8c7b0", ambient: 2.0, lamp: "#fff1dc", strength: 2.0, shadow: 0.2, cone: 0.34 },
   dark: { sky: "#8fa6d8", ground: "#241c2b", ambient: 1.1, lamp: "#ffdca8", strength: 2.4, shadow: 0.45, cone: 0.5 },
@@ -40,6 +43,7 @@ export function scene(place, insets) {
   let isStill = false;
   let last = 0;
   let cost = 0; // ms of a picture of late
+  let slow = 0; // pictures in a row that took too long
   const eye = { from: new THREE.Vector3(...FROM.wide.side), at: new THREE.Vector3(0.5, 0, 0.85), far: 4 };
 
   const size = () => {
@@ -47,20 +51,27 @@ export function scene(place, insets) {
     if (!width || !height) return;
     renderer.setSize(width, height);
     camera.aspect = width / height;
+    last = 0; // it is at once where it is to be: a window that changes is no journey
     isStale = true;
   };
   new ResizeObserver(size).observe(place);
 
+  let top = [0, 0, 1.17]; // where its eyes are, but for what they do as it nods and leans: that does not move the camera
   const company = () => Boolean(told?.people.some((each) => each.at && each.present));
-  // Everything that has to be in view.
+  // Everything that has to be in view: the table, the robot, and who is there; with a seat that is free all of it, from the floor on.
   function inView() {
     const body = told?.body;
-    const top = (body?.eyes ?? [0, 0, 1.17]).map((each) => Math.round(each * 10) / 10); // a head that moves does not move the camera
+    const eyes = body?.eyes ?? [0, 0, 1.17];
+    if (top.some((each, index) => Math.abs(each - eyes[index]) > LEANS)) top = eyes;
     const found = [[top[0] - 0.1, top[1], top[2] + 0.15], [0, -0.3, top[2] - 0.25], [0, 0.3, top[2] - 0.25]];
+    const square = ([x, y], far, z) => found.push(...[-far, far].flatMap((a) => [-far, far].map((b) => [x + a, y + b, z])));
     for (const thing of told?.things ?? []) {
-      if (thing.kind === "object") found.push(...[-1, 1].flatMap((x) => [-1, 1].map((y) => [thing.at[0] + x * ROOM, thing.at[1] + y * ROOM, thing.at[2]])));
+      if (thing.kind === "surface") found.push(...thing.outline.map(([x, y]) => [x, y, thing.at[2]]));
+      if (thing.kind === "surface" && !you) square(thing.at, FEET.table, 0);
+      if (thing.kind === "object") square(thing.at, ROOM, thing.at[2]);
     }
-    if (!company()) found.push([SEAT[0] + 0.1, SEAT[1], 0.45]);
+    if (!you) square([0, 0], FEET.robot, 0);
+    if (!you && !company()) for (const z of [0, FEET.seat]) square(SEAT, FEET.stool, z);
     for (const person of told?.people ?? []) {
       if (!person.present || !person.at || person.id === you) continue;
       const [x, y, z] = person.at;
@@ -72,9 +83,9 @@ export function scene(place, insets) {
   // Aim the camera so that all of this is seen between the bars: the middle and the distance, from a direction.
   const goal = { at: eye.at.clone(), far: eye.far };
   function aim(points, direction) {
-    const { top, bottom, side } = insets();
+    const { top, bottom, left: before, right: behind } = insets();
     const { clientWidth: width, clientHeight: height } = place;
-    const box = { left: -1 + (2 * side) / width, right: 1 - (2 * side) / width, top: 1 - (2 * top) / height, bottom: -1 + (2 * bottom) / height };
+    const box = { left: -1 + (2 * before) / width, right: 1 - (2 * behind) / width, top: 1 - (2 * top) / height, bottom: -1 + (2 * bottom) / height };
     const probe = camera.clone();
     const middle = points.reduce((sum, each) => sum.add(each), new THREE.Vector3()).divideScalar(points.length);
     let far = 4;
@@ -150,8 +161,10 @@ export function scene(place, insets) {
       isStill = turns < 1e-4;
       isStale = moves || turns > 1e-6 || lives;
       renderer.render(world, camera);
-      cost += (performance.now() - began - cost) * 0.1;
-      if (cost > SLOW && renderer.shadowMap.enabled && renderer.info.render.frame > 20) {
+      const took = performance.now() - began;
+      cost += (took - cost) * 0.1;
+      slow = took > SLOW ? slow + 1 : 0;
+      if (slow >= OFTEN && renderer.shadowMap.enabled) {
         renderer.shadowMap.enabled = false;
         renderer.setPixelRatio(1);
         world.traverse((each) => each.material && (each.material.needsUpdate = true));

@@ -19,6 +19,8 @@ const ENGLISH = {
   loud: "The robot's voice",
   talks: "You are talking…",
   type: "Say something",
+  typing: (language) => `Say something in ${language}`,
+  speaking: (language) => `It speaks ${language}.`,
   send: "Say it",
   quick: [["Hello", "Hello!", null], ["Yes", "Yes.", "nod"], ["No", "No.", "shake"]],
   nod: "Nod",
@@ -73,8 +75,10 @@ const GERMAN = {
   loud: "Die Stimme des Roboters",
   talks: "Du sprichst…",
   type: "Sag etwas",
+  typing: (language) => `Sag etwas auf ${language}`,
+  speaking: (language) => `Er spricht ${language}.`,
   send: "Sagen",
-  quick: [["Hallo", "Hello!", null], ["Ja", "Yes.", "nod"], ["Nein", "No.", "shake"]],
+  quick: [["Hallo", "Hallo!", null], ["Ja", "Ja.", "nod"], ["Nein", "Nein.", "shake"]],
   nod: "Nicken",
   point: "Zeigen",
   leave: "Gehen",
@@ -116,5 +120,17 @@ export function language(wanted) {
   return wanted.map((each) => each.slice(0, 2).toLowerCase()).find((each) => each in ALL) ?? "en";
 }
 // Of the sound a visitor is told in other words what only the robot's host can mend, and nothing of what passes.
-export const texts = (name) => ({ ...ALL[name], sound: { ...SOUND_WORDS[name], ...ALL[name].sound } });
+// spoken: the language of the robot, as a tag. What is typed at one touch is in that one.
+export function texts(name, spoken) {
+  const own = ALL[name];
+  const called = new Intl.DisplayNames([name], { type: "language" }).of(spoken.split("-")[0]);
+  const isOther = spoken.split("-")[0].toLowerCase() !== name;
+  return {
+    ...own,
+    welcome: isOther ? `${own.welcome} ${own.speaking(called)}` : own.welcome,
+    type: isOther ? own.typing(called) : own.type,
+    quick: own.quick.map(([label, , how], index) => [label, ALL[language([spoken])].quick[index][1], how]),
+    sound: { ...SOUND_WORDS[name], ...own.sound },
+  };
+}
 export const another = (name) => (name === "de" ? "en" : "de");

@@ -4,6 +4,9 @@ from msgspec import Struct
 
 from engage_hri.schemas.units import Seconds, positive
 
+PAGE = "page"
+"""Source that is no device: what the pages of windows send."""
+
 
 class HearingConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Settings of hearing. Raises ValueError if out of range."""
@@ -34,5 +37,5 @@ class HearingConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     def __post_init__(self) -> None:
         positive(self, ("pause",))
-        if self.people and self.source == "page":
+        if self.people and self.source == PAGE:
             raise ValueError("`people` are those of the channels of a device: who sits at a page is known")

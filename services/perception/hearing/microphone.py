@@ -20,6 +20,7 @@ import numpy as np
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.perception.hearing.child import PipedProcess
+from engage_hri.services.perception.hearing.config import PAGE
 from engage_hri.services.perception.hearing.sound import Piece, SampleClock, read_wav
 from engage_hri.services.perception.hearing.voice import RATE, Samples
 from engage_hri.services.runtime.installation import packages_command
@@ -32,8 +33,6 @@ STARTING: Seconds = 5.0
 """Time until the first sample: devices have to wake up."""
 KEPT = 256
 """Pieces that wait at most while the loop is busy."""
-PAGE = "page"
-"""Source that is no device: what the pages of windows send."""
 OURS = "engage_hri.services.perception.hearing.microphone"
 RECORDERS = {
     "parec": ("parec", "--raw", "--format=s16le", "--rate={rate}", "--channels={channels}", "--latency-msec=20"),

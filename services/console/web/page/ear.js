@@ -11,11 +11,13 @@ class Ear extends AudioWorkletProcessor {
     this.count = 0;
     this.owed = 0; // part of one of our samples for which there is sound already
     this.began = 0;
+    this.out = null; // to who sends it on
+    this.port.onmessage = ({ data }) => (this.out = data);
   }
 
   process(inputs) {
     const sound = inputs[0]?.[0];
-    if (!sound) return true;
+    if (!sound || !this.out) return true;
     for (let index = 0; index < sound.length; index += 1) {
       if (this.filled === 0 && this.count === 0) this.began = currentFrame + index;
       this.sum += sound[index];
@@ -27,7 +29,7 @@ class Ear extends AudioWorkletProcessor {
       this.sum = this.count = 0;
       this.filled += 1;
       if (this.filled < WINDOW) continue;
-      this.port.postMessage({ frame: this.began, samples: this.window.slice(0), ended: Date.now() }); // the only clock that there is here
+      this.out.postMessage({ frame: this.began, samples: this.window.slice(0), ended: Date.now() }); // the only clock that there is here
       this.filled = 0;
     }
     return true;

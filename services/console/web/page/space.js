@@ -121,7 +121,8 @@ function furniture(scene) {
   const sky = new THREE.HemisphereLight("#ffffff", "#8b8577", 2.1);
   const lamp = new THREE.DirectionalLight("#fff4e2", 1.6);
   lamp.position.set(1.2, 1.6, 3.2);
-  const floor = new THREE.Mesh(new THREE.CircleGeometry(2.6, 48), material("#cfd6d8"));
+  const floor = new THREE.Mesh(new THREE.CircleGeometry(1.45, 64), material("#cfd6d8"));
+  floor.position.x = 0.6; // below the table, and whole in each view
   scene.add(sky, lamp, floor);
   return {
     theme(dark) {

@@ -32,8 +32,12 @@ QUIETEST = 0.15
 """Share of the frames that are taken for noise alone."""
 OVER, LEAST = 1.5, 0.25
 """How much more noise than there is is taken out, and what remains at least: by trial, on phrases in pink noise."""
-FIT = -4.0
-"""Fit of sound and phrase, a logarithm for each frame, below which it was something else: by trial."""
+BEAMS = {"beam": 1e-64, "pbeam": 1e-64, "wbeam": 1e-40}
+"""How much less likely than the best what is still looked into may be. With the usual 1e-48 and 7e-29 some of forty
+phrases are given up half-way."""
+FIT = -4.6
+"""Fit of sound and phrase, a logarithm for each frame, below which it was something else: by trial, with these
+beams (docs/decisions/0175)."""
 
 
 class Sphinx(SpeechRecognizer):
@@ -50,7 +54,7 @@ class Sphinx(SpeechRecognizer):
             reason = "sphinx needs the phrases that people may say"
             raise InputRefused(Fault(reason=reason, where="hearing.phrases", advice=advice))
         self._phrases = phrases
-        self._decoder: Any = pocketsphinx.Decoder(samprate=RATE, loglevel="FATAL", lm=None)
+        self._decoder: Any = pocketsphinx.Decoder(samprate=RATE, loglevel="FATAL", lm=None, **BEAMS)
         for phrase in phrases:
             if unknown := [word for word in phrase.split() if self._decoder.lookup_word(word) is None]:
                 reason = f"the dictionary has no {', '.join(map(repr, unknown))}"

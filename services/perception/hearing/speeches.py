@@ -1,0 +1,227 @@
+"""Speeches in sound: when a voice begins and ends in a channel, whose it is, and which words it has.
+
+A voice is told as the action `speak` of a person, with the instants at which it was to be heard, which lie some time
+back when they are known. Where a recognizer is at work, an utterance without words comes first: words will follow.
+"""
+
+import asyncio
+import time
+from collections.abc import Iterable
+from itertools import count
+
+import numpy as np
+from msgspec.structs import replace
+
+from engage_hri.schemas import keys
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import LONGEST_TEXT, ActionBegan, ActionEnded, Utterance
+from engage_hri.schemas.sound import SoundFrame
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.interface import Bus
+from engage_hri.services.perception.hearing.company import HeardPeople, HearingFaults
+from engage_hri.services.perception.hearing.config import HearingConfig
+from engage_hri.services.perception.hearing.listening import InItsOwn, InThisProcess, Order, Understanding
+from engage_hri.services.perception.hearing.microphone import is_file
+from engage_hri.services.perception.hearing.own_voice import VAIN, Canceller, CautiousJudge, OwnVoice
+from engage_hri.services.perception.hearing.recognizing import Answer, KnownWords, SpeechWords, settings_of
+from engage_hri.services.perception.hearing.voice import (
+    Samples,
+    VoiceBegan,
+    VoiceEar,
+    VoiceEnded,
+    VoiceEvent,
+    VoiceSound,
+    silero,
+)
+from engage_hri.services.runtime.installation import extra_command
+
+VISITOR = "visitor"
+"""Id of the person who speaks where nobody tells of any."""
+BEFORE_SPEECH: Seconds = 1.0
+"""Time before the robot speaks from which on sound of its voice is that of this speech."""
+ECHO: Seconds = 0.2
+"""Time for which the robot's voice goes on in the room, and in the devices, when it has ended."""
+LAST_WORDS: Seconds = 25.0
+"""Time that the words of a file may take when it is over."""
+
+
+def is_cancelling(config: HearingConfig) -> bool:
+    """Tell whether the robot's own voice is taken out of the sound: where it is recorded now, unless it is set."""
+    return config.is_deaf_while_robot_speaks is None and not is_file(config.source)
+
+
+class _Speech:
+    """A speech that goes on, or whose words are awaited. number: for the recognizer."""
+
+    def __init__(self, number: int, utterance: Utterance) -> None:
+        self.number, self.utterance = number, utterance
+
+
+class SoundChannel:
+    """A channel of sound. Made by `Speeches`. person: whose voice is in it; empty: that of the only person here.
+
+    speech: what is being said; None also of a voice that is nobody's. canceller, judge: None: the robot's own voice
+    stays in it.
+    """
+
+    def __init__(self, person: str, pause: Seconds, own: OwnVoice | None) -> None:
+        self.person = person
+        self.canceller = None if own is None else Canceller(own)
+        self.judge = None if self.canceller is None else CautiousJudge(silero(), self.canceller)
+        self.ear = VoiceEar(self.judge or silero(), pause)
+        self.speech: _Speech | None = None
+
+
+class Speeches:
+    """What is said in all channels. recognizer: None: nobody understands words."""
+
+    def __init__(self, bus: Bus, config: HearingConfig, people: HeardPeople, faults: HearingFaults) -> None:
+        """Raises InputRefused: there is no such recognizer, or a package is not installed."""
+        self._bus, self._config, self._people, self._faults = bus, config, people, faults
+        try:
+            silero()
+        except ModuleNotFoundError as error:
+            raise InputRefused(Fault(reason=str(error), where="hearing", advice=extra_command("hearing"))) from error
+        self._own_voice = OwnVoice() if is_cancelling(config) else None
+        self._awaited: dict[int, _Speech] = {}
+        """Speeches whose words are not known for good, by number."""
+        self._all_known = asyncio.Event()
+        self._numbers = count(1)
+        self._robot_speaks = float("-inf"), float("-inf")
+        """Since when the robot speaks, or has spoken last, and until when."""
+        self.recognizer = self._understanding()
+
+    def _understanding(self) -> Understanding | None:
+        if not self._config.recognizer:
+            return None
+        is_real = abs(self._bus.now() - time.monotonic()) < 1.0
+        kind = InItsOwn if is_real else InThisProcess
+        return kind(Order(self._config.recognizer, settings_of(self._config)), self._answered)
+
+    def channel(self, person: str) -> SoundChannel:
+        """Make a channel. person: whose voice is in it; empty: that of the only person here."""
+        return SoundChannel(person, self._config.pause, self._own_voice)
+
+    def take(self, message: Message) -> None:
+        """Take what is told of the robot's own voice."""
+        match message:
+            case ActionBegan(actor=self._bus.robot, action="speak", at=at):
+                self._robot_speaks = self._bus.local(at), float("inf")
+            case ActionEnded(actor=self._bus.robot, action="speak", at=at):
+                self._robot_speaks = self._robot_speaks[0], self._bus.local(at) + ECHO
+            case SoundFrame() if self._own_voice is not None:
+                samples = np.frombuffer(message.samples, "<i2")
+                self._own_voice.take(samples, message.rate, self._bus.local(message.at))
+
+    def feed(self, channel: SoundChannel, samples: Samples, at: Seconds) -> None:
+        """Let a channel have more sound. at: loop time at which its first sample was captured."""
+        if self._is_deaf(at):
+            samples = np.zeros_like(samples)
+        if channel.canceller is not None and channel.judge is not None:
+            samples, at = channel.canceller.feed(samples, at)
+            if channel.judge.in_vain > VAIN:
+                reason = "the robot's own voice cannot be taken out of the sound: nobody is heard while it speaks"
+                advice = "use a headset, or the page that plays it"
+                self._faults.tell_once(Fault(reason=reason, where="hearing", advice=advice))
+        self._tell(channel, channel.ear.feed(samples, at))
+
+    def lose(self, channel: SoundChannel) -> None:
+        """Take it that no more sound comes from a channel: what was being said has ended."""
+        self._tell(channel, channel.ear.lose())
+
+    async def known(self) -> None:
+        """Wait until all words are known, for a while."""
+        if self._awaited:
+            self._all_known.clear()
+            try:
+                async with asyncio.timeout(LAST_WORDS):
+                    await self._all_known.wait()
+            except TimeoutError:
+                pass
+
+    def close(self) -> None:
+        """End the recognizer."""
+        if self.recognizer is not None:
+            self.recognizer.close()
+
+    # -- voices -------------------------------------------------------------------------------------------------
+
+    def _tell(self, channel: SoundChannel, events: Iterable[VoiceEvent]) -> None:
+        for event in events:
+            match event:
+                case VoiceBegan(at=at):
+                    channel.speech = self._began(channel, at)
+                case VoiceSound(samples=samples) if channel.speech is not None:
+                    if self.recognizer is not None:
+                        self.recognizer.hear(channel.speech.number, samples.astype("<i2").tobytes())
+                case VoiceEnded(at=at) if (speech := channel.speech) is not None:
+                    channel.speech = None
+                    self._ended(speech, at)
+
+    def _began(self, channel: SoundChannel, at: Seconds) -> _Speech | None:
+        if (person := self._speaker(channel)) is None:
+            return None
+        self._people.bring(person, at)
+        number, stamp = next(self._numbers), self._bus.stamp(at)
+        words = Utterance(actor=person, id=f"{self._bus.run}-{number}", text="", began=stamp, at=stamp, final=False)
+        speech = _Speech(number, words)
+        if self.recognizer is not None:
+            self._awaited[number] = speech
+            self._bus.publish(keys.UTTERANCE, words)  # first, so that whoever waits knows that words will come
+        self._people.perceived.tell(ActionBegan(actor=person, action="speak", at=stamp))
+        return speech
+
+    def _ended(self, speech: _Speech, at: Seconds) -> None:
+        stamp = self._bus.stamp(at)
+        speech.utterance = replace(speech.utterance, ended=stamp)
+        self._people.perceived.tell(ActionEnded(actor=speech.utterance.actor, action="speak", at=stamp))
+        if self.recognizer is not None:
+            self.recognizer.hear(speech.number, b"")
+
+    def _speaker(self, channel: SoundChannel) -> str | None:
+        """The person whose voice this is. None: there are several, and one channel cannot tell them apart."""
+        if channel.person:
+            return channel.person
+        here = self._people.here
+        if len(here) > 1:
+            reason = f"whose voice it is cannot be told: {', '.join(here)} are here, and there is one channel"
+            advice = "name one person for each channel"
+            self._faults.tell_once(Fault(reason=reason, where="hearing.people", advice=advice))
+            return None
+        return here[0] if here else VISITOR
+
+    def _is_deaf(self, at: Seconds) -> bool:
+        """True if the robot's voice may be heard at this time, and cannot be told from a person's."""
+        since, until = self._robot_speaks
+        if not since <= at < until:
+            return False
+        if self._own_voice is None:
+            return bool(self._config.is_deaf_while_robot_speaks)
+        if self._own_voice.told >= since - BEFORE_SPEECH:
+            return False
+        reason = "nobody is heard while the robot speaks, for the sound of its voice is not told"
+        advice = "if it makes none, or with a headset: --set hearing.is_deaf_while_robot_speaks=false"
+        self._faults.tell_once(Fault(reason=reason, where="hearing", advice=advice))
+        return True
+
+    # -- words --------------------------------------------------------------------------------------------------
+
+    def _answered(self, answer: Answer) -> None:
+        speech = self._awaited.get(answer.speech)
+        if speech is None:
+            return
+        words, is_final = SpeechWords(""), True
+        if isinstance(answer, KnownWords):
+            words, is_final = answer.words, answer.final
+        else:
+            self._faults.tell(answer.fault)
+        now = self._bus.stamp()
+        said = replace(
+            speech.utterance, text=words.text[:LONGEST_TEXT], at=now, final=is_final, confidence=words.confidence
+        )
+        self._bus.publish(keys.UTTERANCE, replace(said, ended=said.ended or now) if is_final else said)
+        if is_final:
+            del self._awaited[answer.speech]
+            if not self._awaited:
+                self._all_known.set()
