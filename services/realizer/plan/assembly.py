@@ -270,7 +270,7 @@ class Assembler:
         self.bounds.append(Bound("delay", number, 0, -at))
 
     def _phases_of(self, id: str, cut: int | None) -> tuple[list[Place], list[Bound]]:
-        """What lies between the points of a behavior. cut: first segment that is not given its time."""
+        """Places and bounds between the points of a behavior. cut: first segment that is not given its time."""
         chain, stations, places, bounds = self.chains[id], self.stations[id], list[Place](), list[Bound]()
         lines = _lines(chain.behavior.line)
         always = {pair for group in TYPES[chain.type].one_instant for pair in pairwise(group)}
@@ -395,7 +395,7 @@ class Assembler:
                     yield Place("order", place.source, waits_at, lag, lag, member.behavior, place.lines)
 
     def _never_too_soon(self) -> None:
-        """Have behaviors wait for orders, unless the awaited one waits for it in turn, or there is no time."""
+        """Add the waits for orders, unless the awaited one waits for them in turn, or there is no time."""
         waits = [each for each in self._waits if self._names(each.source, each.target) not in self.waived]
         if not waits:
             return
