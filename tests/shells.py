@@ -16,10 +16,10 @@ SHELLS = {
     "services/control/bases/one_part_motion.py",  # a body that moves on the loop's clock
     "services/control/bases/setpoints.py",  # set points on the loop's clock
     "services/control/bases/walk.py",  # walks through sync points on the loop's clock
+    "services/control/bases/linked.py",  # keeps the connection to a robot
     "services/control/bases/composed.py",  # takes several bodies home at once
     "services/control/mujoco/film.py",  # takes pictures by the clock of the loop
     "services/control/mujoco/pulse.py",  # steps of a physics on loop time
-    "services/control/reachy_mini/link.py",  # keeps the connection to the robot
     "services/control/reachy_mini/connection.py",  # HTTP and WebSockets
     "services/control/voice/player.py",  # runs the program that plays
     "services/control/voice/studio.py",  # runs the process of the synthesizer

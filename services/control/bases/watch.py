@@ -1,13 +1,14 @@
 """Patience with joints that are not where they should be. Pure."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from msgspec import Struct
 
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Radians, Seconds
+from engage_hri.services.control.motion.path import Path
 
 PATIENCE: Seconds = 1.5
 """Seconds without any way after which joints do not come any more."""
@@ -42,6 +43,21 @@ def nearest(since: Seconds, until: Seconds, off_at: Callable[[Seconds], Off]) ->
     """
     places = np.linspace(since, until, SAMPLES).tolist() if until - since > 1e-9 else [since]
     return min(map(off_at, places), key=lambda off: off.share)
+
+
+def settling(path: Path, mark: Seconds, lag: Seconds, near: Sequence[Radians], every: Seconds) -> Seconds:
+    """Time from when the plan is at a place of a path until the joints, which follow it, are measured near it.
+
+    lag: seconds by which they follow. near: how far each may be off. every: seconds between two measurements.
+    """
+    if mark <= 0.0:
+        return 0.0
+    steps = 16
+    for step in range(1, steps + 1):
+        behind = path.position(mark - min(mark, lag * step / steps))
+        if (abs(behind - path.position(mark)) > near).any():
+            return lag * (1.0 - (step - 1) / steps) + every / 2
+    return every / 2
 
 
 class Watch:

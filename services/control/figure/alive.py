@@ -8,6 +8,7 @@ same.
 
 import math
 from bisect import bisect_right
+from collections import deque
 from collections.abc import Mapping, Sequence
 from math import inf, radians, sin, tau
 
@@ -36,6 +37,8 @@ STIRRING: Mapping[str, tuple[float, Seconds, Seconds]] = {
     "right_mouth_corner": (0.03, 9.1, 5.3), "lips": (0.015, 6.1, 3.7),
 }  # fmt: skip
 """Amplitude and the two periods of the motion of each joint of the face, as shares of its way."""
+SOON: Seconds = 0.05
+"""Targets that come further apart than this are no stream: nobody knows how joints go between them."""
 
 
 class Gate:
@@ -61,6 +64,42 @@ def smooth(done: float) -> float:
     """Way of a movement of least jerk, 0 to 1, when this share of its time is over."""
     x = min(max(done, 0.0), 1.0)
     return x * x * x * (10.0 + x * (6.0 * x - 15.0))
+
+
+class Overlay:
+    """Motion that is added to the targets of joints, and taken off again from what is measured of them.
+
+    So no estimate, no sync point, no pose and no correction knows of it. shown: what of it was in the last reading,
+    by joint.
+    """
+
+    def __init__(self, lag: Seconds) -> None:
+        """lag: seconds by which what is measured follows what was sent."""
+        self._lag = lag
+        self._sent: deque[tuple[Seconds, Mapping[str, Radians]]] = deque([(-inf, {})])
+        self._read: Mapping[str, Radians] = {}
+        self.shown: dict[str, Radians] = {}
+
+    def add(self, now: Seconds, by: Mapping[str, Radians]) -> None:
+        """Take note of what is added to the targets from now on."""
+        self._sent.append((now, by))
+
+    def off(self, pose: Mapping[str, Radians], now: Seconds) -> dict[str, Radians]:
+        """Take it off what is measured now. A reading that comes again is old, and as it was."""
+        if pose != self._read:
+            self._read, self.shown = pose, self._measured(now - self._lag)
+        return {joint: angle - self.shown.get(joint, 0.0) for joint, angle in pose.items()}
+
+    def _measured(self, at: Seconds) -> dict[str, Radians]:
+        """Tell what of it joints show by then: they go evenly from one target to the next, if that comes soon."""
+        while len(self._sent) > 1 and self._sent[1][0] <= at:
+            self._sent.popleft()
+        (since, before), (until, after) = self._sent[0], self._sent[min(1, len(self._sent) - 1)]
+        share = (at - since) / (until - since) if since < at < until < since + SOON else 0.0
+        return {
+            joint: (1.0 - share) * before.get(joint, 0.0) + share * after.get(joint, 0.0)
+            for joint in (*before, *(after if share else ()))
+        }
 
 
 class Blinks:

@@ -3,6 +3,7 @@
 A torso behind a table: hip, neck with yaw, pitch and roll, two arms with shoulder yaw, shoulder pitch and elbow.
 Metres and radians; x ahead, y left, z up, origin on the floor below the robot. Shoulder pitch is measured from
 hanging down, forward positive; the elbow flexes the forearm forward, so that an arm stays in one vertical plane.
+Other figures share the axes, and the place where their foot stands.
 """
 
 import math
@@ -104,6 +105,29 @@ LIMIT: Mapping[str, JointLimit] = {limit.joint: limit for limit in JOINTS}
 PARTS: tuple[str, ...] = ("head", "torso", "left_arm", "right_arm", "face")
 CARRIES: Mapping[str, tuple[str, ...]] = {"torso": ("head", "left_arm", "right_arm")}
 """Parts that a part moves with it."""
+
+
+class Mounting:
+    """The place of a robot's foot in the robot's frame. position: metres. facing: radians to its left."""
+
+    def __init__(self, position: Vector, facing: Radians) -> None:
+        self.position = position
+        self._cos, self._sin = cos(facing), sin(facing)
+
+    def to_foot(self, point: Vector) -> Vector:
+        """A point of the robot's frame in the frame of the foot, metres."""
+        x, y, z = (there - here for there, here in zip(point, self.position, strict=True))
+        return (self._cos * x + self._sin * y, self._cos * y - self._sin * x, z)
+
+    def from_foot(self, point: Vector) -> Vector:
+        """A point of the frame of the foot in the robot's frame, metres."""
+        x, y, z = self.turned(point)
+        return (x + self.position[0], y + self.position[1], z + self.position[2])
+
+    def turned(self, axis: Vector) -> Vector:
+        """A direction of the frame of the foot in the robot's frame."""
+        x, y, z = axis
+        return (self._cos * x - self._sin * y, self._sin * x + self._cos * y, z)
 
 
 class Unreachable(ValueError):

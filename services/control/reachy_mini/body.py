@@ -5,8 +5,9 @@ plan has come there *and* the daemon measures the joints there: never because a 
 """
 
 from collections import defaultdict
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import AbstractAsyncContextManager
+from functools import partial
 from math import inf, radians
 from typing import ClassVar, Self
 
@@ -15,9 +16,11 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Wait
 from engage_hri.schemas.body import BodyPose, Capabilities, Estimate
+from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
+from engage_hri.services.control.bases.linked import GAP, Link, LinkedBody
 from engage_hri.services.control.bases.walk import WalkingBody
 from engage_hri.services.control.bases.watch import Off, Watch
 from engage_hri.services.control.config import ControlConfig
@@ -32,9 +35,9 @@ from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import choreography
 from engage_hri.services.control.figure.estimates import wait_estimate
 from engage_hri.services.control.motion.points import WalkPoint
-from engage_hri.services.control.reachy_mini import courses, joints, link
+from engage_hri.services.control.reachy_mini import courses, joints, messages
 from engage_hri.services.control.reachy_mini.idling import Idling
-from engage_hri.services.control.reachy_mini.link import GAP, Connect, Daemon, LinkedBody, Measured
+from engage_hri.services.control.reachy_mini.messages import Measured
 from engage_hri.services.control.reachy_mini.moves import Moves, Run
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 
@@ -42,11 +45,13 @@ STANDING = {"right_antenna": radians(4.0), "left_antenna": radians(4.0)}
 """How far a joint may be off once it has come to stand: an antenna is a long lever on a small motor."""
 RESTS_ON = 2.0
 """The eyes rest on what they look at within this many times the angle that counts as on target."""
+Connect = Callable[[ReachyMiniSettings], AbstractAsyncContextManager[Link]]
 
 
-class ReachyMini(LinkedBody, WalkingBody[Run]):
+class ReachyMini(LinkedBody[Measured], WalkingBody[Run]):
     """Reachy Mini through its daemon. Without `connected()` it answers for a robot at rest: `engage plan` asks so."""
 
+    name, peer = "reachy_mini", "the daemon"
     moves: Moves
     Settings: ClassVar[type[Struct]] = ReachyMiniSettings
     carries: ClassVar[Mapping[str, tuple[str, ...]]] = {"torso": ("head",)}
@@ -59,7 +64,8 @@ class ReachyMini(LinkedBody, WalkingBody[Run]):
         settings: of `control.drivers.reachy_mini`. connect: opens a connection; by default to `settings.url`.
         alive: it breathes, and its antennas sway.
         """
-        LinkedBody.__init__(self, settings or ReachyMiniSettings(), connect or _over_the_network)
+        self.settings = settings or ReachyMiniSettings()
+        LinkedBody.__init__(self, partial(connect or _over_the_network, self.settings), self.settings.silence)
         WalkingBody.__init__(self)
         self.capabilities = Capabilities(
             body="reachy_mini", types=tuple(map(type_name, courses.TYPES)), parts=("head", "torso", "face"),
@@ -78,16 +84,22 @@ class ReachyMini(LinkedBody, WalkingBody[Run]):
 
     def answer(self, measured: Measured) -> str | None:
         now, moves = self._loop.time(), self.moves
-        moves.measured = self._idling.off(measured.pose, now)
+        moves.measured = self._idling.overlay.off(measured.pose, now)
         if now - self.last_frame > GAP:
             moves.stand(self.last_frame)
         moves.correct(now)
         commanded = moves.commanded(now)
         busy = {name for name, track in moves.tracks.items() if name in moves.runs or track.is_moving(now)}
         added = self._idling.added(now, commanded, busy)
-        text = link.target({joint: angle + added.get(joint, 0.0) for joint, angle in commanded.items()})
+        text = messages.target({joint: angle + added.get(joint, 0.0) for joint, angle in commanded.items()})
         before, self._sent = self._sent, text
         return text if text != before else None
+
+    def read(self, text: str | bytes) -> Measured:
+        return messages.read(text)
+
+    def trouble_of(self, measured: Measured) -> Fault | None:
+        return messages.trouble_of(measured)
 
     def be_back(self, measured: Measured) -> None:
         self._idling.stop()
@@ -121,7 +133,7 @@ class ReachyMini(LinkedBody, WalkingBody[Run]):
         )  # fmt: skip
 
     def idle(self) -> Idle:
-        return Idle(added=self._idling.shown)
+        return Idle(added=self._idling.overlay.shown)
 
     def see(self, world: World) -> None:
         self.moves.see(world)
@@ -205,7 +217,7 @@ class ReachyMini(LinkedBody, WalkingBody[Run]):
         return entity if is_seen and moves.off_target(look).share <= RESTS_ON else ""
 
 
-def _over_the_network(settings: ReachyMiniSettings) -> AbstractAsyncContextManager[Daemon]:
+def _over_the_network(settings: ReachyMiniSettings) -> AbstractAsyncContextManager[Link]:
     from engage_hri.services.control.reachy_mini.connection import connected
 
     return connected(settings)

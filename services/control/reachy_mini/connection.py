@@ -9,7 +9,8 @@ import msgspec
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.reachy_mini.link import VERSION, Daemon, Lost
+from engage_hri.services.control.bases.linked import Link, Lost
+from engage_hri.services.control.reachy_mini.messages import VERSION
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 from engage_hri.services.runtime.installation import extra_command
 
@@ -31,7 +32,7 @@ GREETING: Seconds = 15.0
 
 
 @asynccontextmanager
-async def connected(settings: ReachyMiniSettings) -> AsyncIterator[Daemon]:
+async def connected(settings: ReachyMiniSettings) -> AsyncIterator[Link]:
     """Connect to the daemon, wait until it does not move the robot by itself, and see to it that the motors are on.
 
     Raises Lost: it cannot be had now.

@@ -19,10 +19,11 @@ from engage_hri.schemas.world import World
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import choreography, kinematics
 from engage_hri.services.control.figure.course import Course, Situation
+from engage_hri.services.control.figure.kinematics import Mounting
 from engage_hri.services.control.motion.path import Leg
 from engage_hri.services.control.motion.points import WalkPoint, held_on_target
 from engage_hri.services.control.reachy_mini import joints
-from engage_hri.services.control.reachy_mini.joints import Angles, Mounting
+from engage_hri.services.control.reachy_mini.joints import Angles
 
 TYPES = tuple(each for each in choreography.TYPES if each not in (Pointing, Gesture, Speech))
 """Types of behaviors that it performs."""

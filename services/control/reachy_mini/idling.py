@@ -1,15 +1,14 @@
 """Idle motion of Reachy Mini: a breath of its body, and antennas that are never quite still. Pure.
 
-It is added to what the plan has the daemon told, and taken off again from what the daemon measures: so no estimate,
-no sync point, no pose and no correction knows of it. The breath gives way to anything that head or body do or wait
-in, the antennas to any behavior of the face. Its own time goes on with the measurements: after a gap nothing jumps.
+It is added to what the plan has the daemon told, and taken off again from what the daemon measures (`Overlay`). The
+breath gives way to anything that head or body do or wait in, the antennas to any behavior of the face. Its own time
+goes on with the measurements: after a gap nothing jumps.
 """
 
-from collections import deque
-from math import inf, radians, sin, tau
+from math import radians, sin, tau
 
 from engage_hri.schemas.units import Radians, Seconds
-from engage_hri.services.control.figure.alive import BREATH, Gate
+from engage_hri.services.control.figure.alive import BREATH, SOON, Gate, Overlay
 from engage_hri.services.control.reachy_mini import joints
 from engage_hri.services.control.reachy_mini.joints import Angles
 
@@ -18,16 +17,11 @@ LEAN: Radians = radians(0.5)
 SWAY: Radians = radians(2.5)
 """Greatest angle of an antenna."""
 PERIODS: dict[str, tuple[Seconds, Seconds]] = {"right_antenna": (7.3, 4.1), "left_antenna": (8.7, 4.7)}
-LONGEST: Seconds = 0.05
-"""Its time goes on by so much at most from one measurement to the next: breath is a motion of 0.04 degrees then."""
 _RANGES = {limit.joint: limit for limit in joints.LIMITS}
 
 
 class Idling:
-    """Idle motion of one robot. lag: seconds by which what is measured follows what was sent.
-
-    shown: what of it was in the last reading, by joint.
-    """
+    """Idle motion of one robot. lag: seconds by which what is measured follows what was sent."""
 
     def __init__(self, lag: Seconds, *, is_alive: bool) -> None:
         """is_alive: False: it never moves."""
@@ -39,9 +33,7 @@ class Idling:
     def stop(self) -> None:
         """Begin anew: nobody knows where the joints are."""
         self._face, self._body = Gate(is_open=False), Gate(is_open=False)
-        self._sent: deque[tuple[Seconds, dict[str, Radians]]] = deque([(-inf, {})])
-        self._read: dict[str, Radians] = {}
-        self.shown: dict[str, Radians] = {}
+        self.overlay = Overlay(self._lag)
 
     def added(self, now: Seconds, planned: Angles, busy: set[str]) -> dict[str, Radians]:
         """Tell what to add to the joints now, and take it as sent.
@@ -50,7 +42,8 @@ class Idling:
         """
         if not self._is_alive:
             return {}
-        self._time += min(LONGEST, now - self._seen) if self._seen is not None else 0.0
+        # However late a measurement comes, breath is a motion of 0.04 degrees then.
+        self._time += min(SOON, now - self._seen) if self._seen is not None else 0.0
         self._seen = now
         of_face = self._face.share(self._time, is_open="face" not in busy)
         of_body = self._body.share(self._time, is_open=not busy - {"face"})
@@ -60,25 +53,8 @@ class Idling:
             found[joint] = of_face * SWAY * (sin(tau * self._time / one) + sin(tau * self._time / other)) / 2
         kept = {joint: _within(joint, planned[joint], by) for joint, by in found.items()}
         kept = {joint: by for joint, by in kept.items() if by}
-        self._sent.append((now, kept))
+        self.overlay.add(now, kept)
         return kept
-
-    def off(self, pose: dict[str, Radians], now: Seconds) -> dict[str, Radians]:
-        """Take it off what is measured now. A reading that comes again is old, and as it was."""
-        if pose != self._read:
-            self._read, self.shown = pose, self._measured(now - self._lag)
-        return {joint: angle - self.shown.get(joint, 0.0) for joint, angle in pose.items()}
-
-    def _measured(self, at: Seconds) -> dict[str, Radians]:
-        """Tell what of it joints show by then: they go evenly from one target to the next."""
-        while len(self._sent) > 1 and self._sent[1][0] <= at:
-            self._sent.popleft()
-        (since, before), (until, after) = self._sent[0], self._sent[min(1, len(self._sent) - 1)]
-        share = (at - since) / (until - since) if since < at < until < since + LONGEST else 0.0
-        return {
-            joint: (1.0 - share) * before.get(joint, 0.0) + share * after.get(joint, 0.0)
-            for joint in (*before, *(after if share else ()))
-        }
 
 
 def _within(joint: str, planned: Radians, by: Radians) -> Radians:

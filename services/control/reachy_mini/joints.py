@@ -17,7 +17,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.body import BodyPose, JointAngle, JointLimit, Ray
 from engage_hri.schemas.units import Meters, Radians, Vector
 from engage_hri.services.control.figure import kinematics
-from engage_hri.services.control.figure.kinematics import limit_in_degrees
+from engage_hri.services.control.figure.kinematics import Mounting, limit_in_degrees
 
 ASIDE = radians(30.0)
 """A head that looks further aside than this of the body's direction takes the body along."""
@@ -124,29 +124,6 @@ def message(tracks: Mapping[str, tuple[float, ...]]) -> BodyPose:
 
 
 # -- places -------------------------------------------------------------------------------------------------------
-
-
-class Mounting:
-    """The place of the foot in the robot's frame. position: metres. facing: radians to its left."""
-
-    def __init__(self, position: Vector, facing: Radians) -> None:
-        self.position = position
-        self._cos, self._sin = math.cos(facing), math.sin(facing)
-
-    def to_foot(self, point: Vector) -> Vector:
-        """A point of the robot's frame in the frame of the foot, metres."""
-        x, y, z = (there - here for there, here in zip(point, self.position, strict=True))
-        return (self._cos * x + self._sin * y, self._cos * y - self._sin * x, z)
-
-    def from_foot(self, point: Vector) -> Vector:
-        """A point of the frame of the foot in the robot's frame, metres."""
-        x, y, z = self.turned(point)
-        return (x + self.position[0], y + self.position[1], z + self.position[2])
-
-    def turned(self, axis: Vector) -> Vector:
-        """A direction of the frame of the foot in the robot's frame."""
-        x, y, z = axis
-        return (self._cos * x - self._sin * y, self._sin * x + self._cos * y, z)
 
 
 def head_place(pose: Angles) -> Vector:

@@ -16,20 +16,21 @@ from engage_hri.schemas.body import BodyPose, Estimate
 from engage_hri.schemas.units import Radians, Seconds, Vector
 from engage_hri.schemas.world import World
 from engage_hri.services.control.bases import moving_parts
+from engage_hri.services.control.bases.linked import GAP
 from engage_hri.services.control.bases.moving_parts import Clock, MovingParts
-from engage_hri.services.control.bases.watch import Off, Watch, farthest, nearest
+from engage_hri.services.control.bases.watch import Off, Watch, farthest, nearest, settling
 from engage_hri.services.control.contract.body import MovementAuthority
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure.course import Course
 from engage_hri.services.control.figure.estimates import phases
+from engage_hri.services.control.figure.kinematics import Mounting
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import Array, JointMotion, Leg, Path, resting
 from engage_hri.services.control.motion.points import WalkPoint, is_shift
 from engage_hri.services.control.motion.track import Place, Track
 from engage_hri.services.control.reachy_mini import courses, joints
 from engage_hri.services.control.reachy_mini.courses import Circumstances
-from engage_hri.services.control.reachy_mini.joints import Angles, Mounting
-from engage_hri.services.control.reachy_mini.link import GAP
+from engage_hri.services.control.reachy_mini.joints import Angles
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 
 NEAR = {
@@ -187,10 +188,11 @@ class Moves(MovingParts[Run]):
         track = self.tracks[name]
         start = resting(here[name]) if is_resting else self._start(track, behavior)
         path = Path(start, course.legs, track.own_limits)
-        times = {sync: s + settling(name, path, s, lag) for sync, s in path.marks.items()}
+        near = [NEAR[each] for each in track.joints]
+        times = {sync: s + settling(path, s, lag, near, FRAME) for sync, s in path.marks.items()}
         if "end" not in times:
             back = self.way(name, resting(goal), track.base)
-            times["end"] = times["relax"] + back.length + settling(name, back, back.length, lag)
+            times["end"] = times["relax"] + back.length + settling(back, back.length, lag, near, FRAME)
         after = {**here, name: here[name] if name == "nod" else goal}
         if name == "torso":  # the head keeps looking where it does; the body turns under it
             after["head"] = (*here["head"][:2], joints.follow(here["head"][0], goal[0]))
@@ -400,15 +402,3 @@ class Moves(MovingParts[Run]):
                 self._play(run, path, track.aim, at)
             else:
                 track.play(Motion(path, at), aim=track.aim)
-
-
-def settling(track: str, path: Path, mark: Seconds, lag: Seconds) -> Seconds:
-    """Time from when the plan is at a place of a path until the joints are measured near it."""
-    if mark <= 0.0:
-        return 0.0
-    near, steps = [NEAR[limit.joint] for limit in joints.TRACKS[track]], 16
-    for step in range(1, steps + 1):
-        behind = path.position(mark - min(mark, lag * step / steps))
-        if (abs(behind - path.position(mark)) > near).any():
-            return lag * (1.0 - (step - 1) / steps) + FRAME / 2
-    return FRAME / 2

@@ -6,7 +6,7 @@ connected components of the ties.
 """
 
 import heapq
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from math import inf
 from typing import TypeVar
@@ -74,44 +74,40 @@ def _left(size: int, out: Mapping[int, Sequence[int]]) -> list[int]:
     return finished
 
 
-_Tie = tuple[int, int, PlaceKind, Seconds, str, tuple[int, ...], tuple[Seconds, str]]
-TieT = TypeVar("TieT", Place, Bound)
+_Tie = TypeVar("_Tie", bound=tuple[object, ...])
 
 
 def numbered(
     transitions: Sequence[Transition], places: Sequence[Place], bounds: Sequence[Bound]
-) -> tuple[PetriNet, list[int], bool]:
-    """The net, the former number of each transition, and whether they can all fire in this order.
+) -> tuple[PetriNet, list[int], set[int]]:
+    """The net, the former number of each transition, and the former numbers of those that wait for each other.
 
-    Transitions that wait for each other come last, before the end.
+    Those come last, before the end.
     """
     ranked = _firing_order(len(transitions), places)
-    is_ordered = len(ranked) == len(transitions)
-    if not is_ordered:
-        known = set(ranked)
-        ranked += [each for each in range(len(transitions)) if each not in known]
+    unfired = {*range(len(transitions))}.difference(ranked)
+    ranked += sorted(unfired)
     number = [0] * len(ranked)
     for new, old in enumerate(ranked):
         number[old] = new
-    ties = _renumbered(places, number, lambda place: (place.shortest, place.after))
-    limits = _renumbered(bounds, number, lambda bound: (inf if bound.stretch is None else bound.stretch, ""))
+    ties = _in_order(
+        [(number[it.source], number[it.target], it.kind, it.lag, it.behavior, it.lines, it.shortest, it.after)
+         for it in places]
+    )  # fmt: skip
+    limits = _in_order(
+        [(number[it.source], number[it.target], it.kind, it.lag, it.behavior, it.lines,
+          inf if it.stretch is None else it.stretch) for it in bounds]
+    )  # fmt: skip
     placed = [
         Place(kind, source, target, lag, shortest, behavior, lines, after)
-        for source, target, kind, lag, behavior, lines, (shortest, after) in _in_order(ties)
+        for source, target, kind, lag, behavior, lines, shortest, after in ties
     ]
     bounded = [
         Bound(kind, source, target, lag, None if stretch == inf else stretch, behavior, lines)
-        for source, target, kind, lag, behavior, lines, (stretch, _) in _in_order(limits)
+        for source, target, kind, lag, behavior, lines, stretch in limits
     ]
     net = PetriNet(tuple([transitions[each] for each in ranked]), tuple(placed), tuple(bounded))
-    return net, ranked, is_ordered
-
-
-def _renumbered(
-    ties: Sequence[TieT], number: Sequence[int], last: Callable[[TieT], tuple[Seconds, str]]
-) -> list[_Tie]:
-    """Each place or bound as a tuple that can be sorted, with the new numbers of its ends."""
-    return [(number[it.source], number[it.target], it.kind, it.lag, it.behavior, it.lines, last(it)) for it in ties]
+    return net, ranked, unfired
 
 
 def _firing_order(size: int, places: Sequence[Place]) -> list[int]:
@@ -136,7 +132,7 @@ def _firing_order(size: int, places: Sequence[Place]) -> list[int]:
 def _in_order(ties: list[_Tie]) -> list[_Tie]:
     """The ties in order, without repetitions."""
     ties.sort()
-    return [tie for tie, before in zip(ties, [None, *ties], strict=False) if tie != before]
+    return ties[:1] + [tie for before, tie in pairwise(ties) if tie != before]
 
 
 class Assembly(Struct, frozen=True):
@@ -200,21 +196,32 @@ class Assembler:
             *(Transition(" = ".join(map(str, instant.points)), instant.points) for instant in found),
             Transition("bml:end", ()),
         ]
+        self.stations = {id: [self.at[point] for point in each.points] for id, each in chains.items()}
+        """The transitions of the points of each behavior."""
         self.places: list[Place] = []
         self.bounds: list[Bound] = []
         self._class_delays(found)
         for relation in relations.orders:
             self._order(relation)
-        self._foreign = frozenset(self.at[point] for point in foreign)
+        self._waits = list(self._waits_for_orders(frozenset(self.at[point] for point in foreign)))
         self._fixed = (self.places, self.bounds)
+        self._phases: dict[tuple[str, int | None], tuple[list[Place], list[Bound]]] = {}
+        """Those of each behavior, cut at a segment."""
+        speeches = [each for each in chains.values() if each.type == "speech"]
+        self._voiced = {id for pair in self._neighbors(each.behavior.id for each in speeches) for id in pair}
+        """Speeches that share a voice with others."""
 
     def assemble(self, arrangement: Arrangement) -> Assembly:
         """The net for this arrangement."""
         self.arrangement = arrangement
         places, bounds = self._fixed
         self.places, self.bounds = list(places), list(bounds)
-        for id in sorted(self.chains):
-            self._phases(self.chains[id])
+        for each in [(id, arrangement.cuts.get(id)) for id in sorted(self.chains)]:
+            if each not in self._phases:
+                self._phases[each] = self._phases_of(*each)
+            places, bounds = self._phases[each]
+            self.places += places
+            self.bounds += bounds
         self._series()
         self._arranged()
         self._never_too_soon()
@@ -262,16 +269,17 @@ class Assembler:
             self.places.append(Place("delay", 0, number, at, at))
         self.bounds.append(Bound("delay", number, 0, -at))
 
-    def _phases(self, chain: Chain) -> None:
-        id, lines, at = chain.behavior.id, _lines(chain.behavior.line), self.at
+    def _phases_of(self, id: str, cut: int | None) -> tuple[list[Place], list[Bound]]:
+        """Places and bounds between the points of a behavior. cut: first segment that is not given its time."""
+        chain, stations, places, bounds = self.chains[id], self.stations[id], list[Place](), list[Bound]()
+        lines = _lines(chain.behavior.line)
         always = {pair for group in TYPES[chain.type].one_instant for pair in pairwise(group)}
-        cut = self.arrangement.cuts.get(id)
-        if (start := at[chain.points[0]]) != 0:
-            self.places.append(Place("order", 0, start, behavior=id, lines=lines))
+        if stations[0] != 0:
+            places.append(Place("order", 0, stations[0], behavior=id, lines=lines))
         way, lag, shortest, longest = 0.0, 0.0, 0.0, 0.0
         unlimited = False
         for number, segment in enumerate(chain.segments):
-            source, target = at[chain.points[number]], at[chain.points[number + 1]]
+            source, target = stations[number], stations[number + 1]
             gone = cut is not None and number >= cut
             limit = chain.longest[number]
             way += segment.natural
@@ -282,13 +290,14 @@ class Assembler:
                 unlimited = unlimited or (limit is None and source != target)
             if (segment.since, segment.to) in always or (source == target and shortest <= EPSILON):
                 continue
-            self.places.append(Place("phase", source, target, lag, shortest, id, lines))
+            places.append(Place("phase", source, target, lag, shortest, id, lines))
             kind = self.kinds[id, target]
             if not gone and source != target and kind != "hold":
                 stretch = None if unlimited or kind == "prompt" else max(0.0, longest - lag)
                 reserve = RESERVE * way if kind == "prompt" and chain.type in WITH_STROKE else 0.0
-                self.bounds.append(Bound("phase", target, source, -lag - reserve, stretch, id, lines))
+                bounds.append(Bound("phase", target, source, -lag - reserve, stretch, id, lines))
             lag, shortest, longest, unlimited = 0.0, 0.0, 0.0, False
+        return places, bounds
 
     def _order(self, relation: Order) -> None:
         earlier, later = relation.earlier, relation.later
@@ -309,13 +318,13 @@ class Assembler:
 
         Nothing waits for it. Speeches share a voice: each follows those before it, whatever is said about them.
         """
-        sharing = self._speak_in_turn()
+        self._speak_in_turn()
         previous: dict[str, Chain] = {}
         for id, chain in self.chains.items():
             series = SERIES[chain.type]
             before = previous.get(series)
             previous[series] = chain
-            is_placed = id in self.relations.placed or id in sharing or id in self.arrangement.begun
+            is_placed = id in self.placed or id in self._voiced or id in self.arrangement.begun
             if before is None or is_placed or performer(chain.behavior) == "recognition":
                 continue
             other, sync, seconds = before.behavior.id, "end", 0.0
@@ -323,19 +332,18 @@ class Assembler:
                 # The previous one lasts until this one takes over, which is as soon as the previous is on target.
                 sync = "stroke"
                 seconds = sum(each.natural for each in before.segments if each.since in ("stroke", "stroke_end"))
-            ends = Point(other, sync), Point(id, "start")
-            if (self._name(self.at[ends[0]]), self._name(self.at[ends[1]])) not in self.waived:
-                self._follow(*ends, seconds, lines=_lines(chain.behavior.line))
+            source, target = self.at[Point(other, sync)], self.stations[id][0]
+            if source != target and self._names(source, target) not in self.waived:
+                lines = _lines(chain.behavior.line)
+                self.places.append(Place("series", source, target, seconds, seconds, "", lines, other))
 
-    def _speak_in_turn(self) -> set[str]:
-        """Put each speech after the one before it on its voice. Returns those that share a voice."""
+    def _speak_in_turn(self) -> None:
+        """Put each speech after the one before it on its voice."""
         for earlier, later in self._neighbors(self.arrangement.spoken):
             chain = self.chains[later]
             if not is_tied(chain, self.chains[earlier], self.classes):
                 lines = _lines(chain.behavior.line)
-                self._follow(Point(earlier, "end"), chain.points[0], behavior=later, lines=lines)
-        speeches = [id for id, chain in self.chains.items() if chain.type == "speech"]
-        return {id for pair in self._neighbors(speeches) for id in pair}
+                self._follow(Point(earlier, "end"), chain.points[0], later, lines)
 
     def _neighbors(self, speeches: Iterable[str]) -> Iterator[tuple[str, str]]:
         """Speeches of one voice, each with the next."""
@@ -347,50 +355,48 @@ class Assembler:
 
     def _arranged(self) -> None:
         for later, earlier in self.arrangement.turns:
-            self._follow(earlier, Point(later, "start"), behavior=later)
+            self._follow(earlier, Point(later, "start"), later)
         for handovers in self.arrangement.handovers.values():
             for successor, kept in handovers:
-                self._follow(kept, Point(successor, "start"), behavior=successor)
+                self._follow(kept, Point(successor, "start"), successor)
         for id, (successor, point) in self.arrangement.successors.items():
             kind: PlaceKind = "series" if id in self.arrangement.natural else "handover"
-            self._follow(Point(successor, "start"), point, behavior=id, kind=kind)
+            self._follow(Point(successor, "start"), point, id, kind=kind)
         others = [id for id in self.chains if id in self.waited_for and id not in self.arrangement.natural]
         for id in self.arrangement.lasting:
             for last in filter(None, [self.arrangement.lasts_for(id, self.chains[other]) for other in others]):
-                self._follow(last, Point(id, "relax"), behavior=id)
+                self._follow(last, Point(id, "relax"), id)
 
     def _follow(
         self,
         before: Point,
         point: Point,
-        seconds: Seconds = 0.0,
-        *,
-        behavior: str = "",
+        behavior: str,
         lines: tuple[int, ...] = (),
         kind: PlaceKind = "series",
     ) -> None:
         source, target, after = self.at[before], self.at[point], before.behavior if kind == "series" else ""
         if source != target:
-            self.places.append(Place(kind, source, target, seconds, seconds, behavior, lines, after))
+            self.places.append(Place(kind, source, target, 0.0, 0.0, behavior, lines, after))
 
-    def _never_too_soon(self) -> None:
+    def _waits_for_orders(self, foreign: Container[int]) -> Iterator[Place]:
         """Make sure of orders on points that cannot wait: the behavior waits where it last can before such a point.
 
-        Prediction must do instead if the awaited one waits for it in turn, if there is no time, or if others of the
-        instant wait for another block. (Words after that block's words do not wait for a stroke, too.)
+        Prediction must do instead if others of the instant wait for another block. (Words after that block's words do
+        not wait for a stroke, too.) foreign: transitions of other blocks.
         """
-        waits = []
         for place in self.places:
-            if place.source in self._foreign and any(each.kind != "passive" for each in self.members[place.target]):
-                continue
-            if place.kind == "order" and place.source != 0:
-                for member in self.members[place.target]:
-                    if member.kind == "passive" and (chain := self.chains.get(member.behavior)):
-                        waits_at, seconds = self._last_wait(chain, place.target)
-                        lag = max(0.0, round(place.lag - seconds, 9))
-                        wait = Place("order", place.source, waits_at, lag, lag, member.behavior, place.lines)
-                        if (self._name(place.source), self._name(waits_at)) not in self.waived:
-                            waits.append(wait)
+            members = self.members[place.target]
+            is_promised = place.source in foreign and any(each.kind != "passive" for each in members)
+            for member in members if place.kind == "order" and place.source != 0 and not is_promised else ():
+                if member.kind == "passive" and (chain := self.chains.get(member.behavior)):
+                    waits_at, seconds = self._last_wait(chain, place.target)
+                    lag = max(0.0, round(place.lag - seconds, 9))
+                    yield Place("order", place.source, waits_at, lag, lag, member.behavior, place.lines)
+
+    def _never_too_soon(self) -> None:
+        """Add the waits for orders, unless the awaited one waits for them in turn, or there is no time."""
+        waits = [each for each in self._waits if self._names(each.source, each.target) not in self.waived]
         if not waits:
             return
         out: dict[int, list[int]] = {}
@@ -400,8 +406,8 @@ class Assembler:
         circle = {each: number for number, group in enumerate(groups) for each in group}
         self.places += [place for place in waits if circle[place.source] != circle[place.target]]
 
-    def _name(self, transition: int) -> str:
-        return self.transitions[transition].name
+    def _names(self, *ends: int) -> tuple[str, ...]:
+        return tuple([self.transitions[each].name for each in ends])
 
     def waive(self, ties: Iterable[tuple[str, str]]) -> None:
         """Leave out these waits from now on; see `Assembly.waits`."""
@@ -409,7 +415,7 @@ class Assembler:
 
     def _last_wait(self, chain: Chain, transition: int) -> tuple[int, Seconds]:
         """The last transition before `transition` where the behavior can wait, and the seconds from there."""
-        stations = [self.at[point] for point in chain.points]
+        stations = self.stations[chain.behavior.id]
         seconds = 0.0
         for number in range(stations.index(transition) - 1, -1, -1):
             seconds += chain.segments[number].natural
@@ -424,8 +430,7 @@ class Assembler:
         A behavior that may outlast the block holds a token from its own end to its start: so it begins once, too.
         """
         self.places.append(Place("order", 0, end))
-        for id, chain in self.chains.items():
-            start, last = self.at[chain.points[0]], self.at[chain.points[-1]]
+        for id, (start, *_, last) in self.stations.items():
             is_awaited = id in self.waited_for
             self.places.append(Place("order", last if is_awaited else start, end, behavior=id))
             if not is_awaited:
@@ -437,17 +442,17 @@ class Assembler:
         self.places.append(Place("idle", end, 0))
 
     def _in_firing_order(self) -> Assembly:
-        net, ranked, is_ordered = numbered(self.transitions, self.places, self.bounds)
+        net, ranked, self._unfired = numbered(self.transitions, self.places, self.bounds)
         number = {old: new for new, old in enumerate(ranked)}
         at = {point: number[each] for point, each in self.at.items()}
         members = tuple([self.members[each] if each < self.size else () for each in ranked])
-        return Assembly(prolonged(net, members, self.chains, self.arrangement.stops), is_ordered, at, members)
+        return Assembly(prolonged(net, members, self.chains, self.arrangement.stops), not self._unfired, at, members)
 
     def circles(self) -> list[list[Point]]:
         """Points that wait for each other in a circle of no length, so are one instant: circular synchronization."""
         out: dict[int, list[int]] = {}
         for place in self.places:
-            if place.kind != "idle" and place.shortest <= EPSILON:
+            if place.shortest <= EPSILON and place.source in self._unfired and place.kind != "idle":
                 out.setdefault(place.source, []).append(place.target)
         groups = [group for group in components(len(self.transitions), out) if len(group) > 1]
         return [[self.transitions[each].points[0] for each in group if each < self.size] for group in groups]

@@ -446,7 +446,7 @@ def awaited(assembly: Assembly, known: Known, waived: Container[tuple[Point, Poi
 
     waived: pairs of such points that do not count.
     """
-    for foreign, target in assembly.at.items():
+    for foreign, target in assembly.at.items() if known.awaiting else ():
         for own, seconds in known.awaiting.get(foreign, {}).items():
             source = len(assembly.members) - 1 if own == BLOCK_END else assembly.at.get(own, 0)
             if source and source != target and (own, foreign) not in waived:

@@ -247,7 +247,7 @@ class _Room:
         if self._apart[later, earlier] > EPSILON:
             return None
         longer = self._apart[:, earlier, None] + self._apart[later]
-        return _Room(np.maximum(self._apart, longer), self._is_free)
+        return _Room(np.maximum(self._apart, longer, out=longer), self._is_free)
 
     def decided(self, groups: Iterable[Sequence[int]]) -> "_Room":
         """The room that is left if one waits for the other wherever only one of the two can."""
@@ -271,9 +271,17 @@ def _room(users: Sequence[Chain], untouched: Untouched, classes: Classes | None)
     spare[0] = []  # From each start, the way through the start of the block is known then.
     starts = [at[chain.points[0]] for chain in users]
     ends = [at[chain.points[untouched.left(chain)]] for chain in users]
-    found = np.array([distances(start, spare) for start in starts])
-    least_spare = np.minimum(found[:, ends], found[:, :1] + clock[ends])
+    ways = (distances(start, spare) for start in starts)
+    found = np.array([[way[each] for each in (0, *ends)] for way in ways])
+    least_spare = np.minimum(found[:, 1:], found[:, :1] + clock[ends])
     is_free = np.zeros((len(users), len(users)), np.bool_)
     if classes is not None:
-        is_free[:] = [[is_tied(later, earlier, classes) for earlier in users] for later in users]
+        roots = [{classes.find(point)[0] for point in each.points} for each in users]
+        is_free[:] = [
+            [
+                not own.isdisjoint(roots[number]) and is_tied(later, earlier, classes)
+                for number, earlier in enumerate(users)
+            ]
+            for later, own in zip(users, roots, strict=True)
+        ]
     return _Room(times[ends] - times[starts, None] - least_spare, is_free)

@@ -38,7 +38,7 @@ from engage_hri.services.realizer.plan.losses import clashes
 from engage_hri.services.realizer.plan.part_order import Untouched
 from engage_hri.services.realizer.plan.phases import ARMS, as_run, natural_ends
 from engage_hri.services.realizer.plan.plan import AT_EASE, Manner, Plan, compared, eased, standing
-from engage_hri.services.realizer.plan.relations import BlockRefused, Classes, Equal, Term
+from engage_hri.services.realizer.plan.relations import BlockRefused, Equal, Term
 from engage_hri.services.realizer.plan.remaining import Draft, remaining
 from engage_hri.services.realizer.plan.repairs import Stuck, repaired
 from engage_hri.services.realizer.plan.schedule import Impossible, Solution, critical_path, predict
@@ -83,7 +83,7 @@ def _planned(draft: Draft, barred: Container[tuple[str, Hand]]) -> Steps[Plan | 
     one is taken.
     """
     known = draft.known
-    present, classes, assembler = draft.begin_anew()
+    present, assembler = draft.begin_anew()
     natural = natural_ends(draft.chains, present)
     draft.turns = frozen(turn for turn in draft.turns if {turn[0], turn[1].behavior} <= draft.chains.keys())
     first = Arrangement(natural, known.begun, early=frozenset(draft.early), stops=known.stops)
@@ -93,11 +93,12 @@ def _planned(draft: Draft, barred: Container[tuple[str, Hand]]) -> Steps[Plan | 
     """Arrangements since the last conflict."""
     while True:
         if (named := naming_others(present, arrangement)) != assembler.relations:
-            assembler = Assembler(draft.chains, named, classes, assembler.waited_for)
-        scheduled = yield from _scheduled(draft, assembler, arrangement, classes)
+            assembler = Assembler(draft.chains, named, assembler.classes, assembler.waited_for)
+        scheduled = yield from _scheduled(draft, assembler, arrangement)
         if scheduled is None:
             return None
         assembler, assembly, solution = scheduled
+        classes = assembler.classes
         seen = Untouched(assembly, solution.times, present)
         if draft.order.find(seen, draft.chains, classes) or draft.parts.see(seen, draft.chains):
             return None
@@ -168,7 +169,7 @@ def _planned(draft: Draft, barred: Container[tuple[str, Hand]]) -> Steps[Plan | 
 
 
 def _scheduled(
-    draft: Draft, assembler: Assembler, arrangement: Arrangement, classes: Classes
+    draft: Draft, assembler: Assembler, arrangement: Arrangement
 ) -> Steps[tuple[Assembler, Assembly, Solution] | None]:
     """The net and its schedule; None if the block is to be planned anew. Raises BlockRefused: a deadlock.
 
@@ -178,6 +179,7 @@ def _scheduled(
         assembler.waive(draft.customs)
         assembly = assembler.assemble(arrangement)
         if not assembly.is_ordered and (circles := assembler.circles()):
+            classes = assembler.classes.copy()
             for points in circles:
                 classes.tie(Equal(tuple([Term(point, 0.0, str(point)) for point in points])), draft.block.id)
             assembler = Assembler(draft.chains, assembler.relations, classes, assembler.waited_for)
@@ -188,7 +190,7 @@ def _scheduled(
         try:
             solution = predict(assembly.net, assembly.waits, times, behind, draft.manner.may_be_late)
         except Impossible as impossible:
-            stuck = Stuck(impossible.circles, assembly, arrangement, assembler.relations, classes)
+            stuck = Stuck(impossible.circles, assembly, arrangement, assembler)
             if repaired(draft, stuck) == "anew":
                 return None
             yield SLICE

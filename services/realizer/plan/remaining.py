@@ -231,7 +231,7 @@ class Draft:
         self.hands: dict[str, Hand] = {}
         self.late: Late = {}
         self.chains: dict[str, Chain] = {}
-        self._left: tuple[set[Point], Relations, Classes, Assembler] | None = None
+        self._left: tuple[set[Point], Relations, Assembler] | None = None
         """What `begin_anew` returns, with the ties that were given up by then; None: it is to be found anew."""
         self.relations = relations_of(block, known.blocks)
         self.problems = [*dict.fromkeys((*self.relations.problems, *manner.lost))]
@@ -284,8 +284,8 @@ class Draft:
             if needed in self.depending:
                 self.depending[id] = fallen, self.depending[needed][1], self.problems[-1]
 
-    def begin_anew(self) -> tuple[Relations, Classes, Assembler]:
-        """Return what the block says of the behaviors that are left, their classes of points, and their assembler.
+    def begin_anew(self) -> tuple[Relations, Assembler]:
+        """Return what the block says of the behaviors that are left, and their assembler.
 
         Waits for parts come from changed orders only. Raises BlockRefused: the relations contradict each other.
         """
@@ -294,10 +294,8 @@ class Draft:
             said = untied(self.relations, self.untied) if self.untied else self.relations
             present, classes = remaining(said, self.chains, self.dropped, self.block.id)
             waited_for = frozenset(self.chains) - unawaited_events(self.chains, present)
-            assembler = Assembler(self.chains, present, classes, waited_for)
-            self._left = {*self.untied}, present, classes, assembler
-        _, present, classes, assembler = self._left
-        return present, classes.copy(), assembler
+            self._left = {*self.untied}, present, Assembler(self.chains, present, classes, waited_for)
+        return self._left[1:]
 
     def give_up(self, found: Iterable[Loss], present: Relations) -> None:
         """Give up what cannot be on time: a wait for the voice, a time of a speech, or else the behavior."""

@@ -37,11 +37,10 @@ from collections.abc import Callable, Collection, Iterable
 from typing import Literal, NamedTuple, TypeVar
 
 from engage_hri.services.realizer.net.petri_net import Bound, Place
-from engage_hri.services.realizer.plan.assembly import Assembly
+from engage_hri.services.realizer.plan.assembly import Assembler, Assembly
 from engage_hri.services.realizer.plan.handover import Arrangement, Turn, by_ends, turns_in
 from engage_hri.services.realizer.plan.known import is_foreign
 from engage_hri.services.realizer.plan.losses import Loss, judge
-from engage_hri.services.realizer.plan.relations import Classes, Relations
 from engage_hri.services.realizer.plan.remaining import Draft
 from engage_hri.services.realizer.plan.schedule import Awaited, Circle, Foresight
 from engage_hri.services.realizer.plan.words import other_part, taken
@@ -53,13 +52,12 @@ Next = Literal["again", "anew"]
 
 
 class Stuck(NamedTuple):
-    """A net without a schedule. circles: of its ties. present: what the block says of the behaviors that are left."""
+    """A net without a schedule. circles: of its ties."""
 
     circles: tuple[Circle, ...]
     assembly: Assembly
     arrangement: Arrangement
-    present: Relations
-    classes: Classes
+    assembler: Assembler
 
     def turns_of(self, turns: Iterable[Turn], *circles: Circle) -> list[Turn]:
         """Find those of the turns that the circles go through."""
@@ -126,7 +124,7 @@ def lose_to_others(draft: Draft, stuck: Stuck) -> Next | None:
         found[id] = Loss(id, f"cannot be on time: {has}", points, frozenset(among), (id, until), advice)
     if not found:
         return None
-    draft.give_up([found[id] for id in draft.chains if id in found], stuck.present)
+    draft.give_up([found[id] for id in draft.chains if id in found], stuck.assembler.relations)
     return "anew"
 
 
@@ -176,11 +174,11 @@ def skip_customs(draft: Draft, stuck: Stuck) -> Next | None:
 def lose(draft: Draft, stuck: Stuck) -> Next:
     """Lose a behavior for each circle, or a time of a speech. Raises BlockRefused if neither can be."""
     turns = draft.turns | stuck.arrangement.waits | draft.order.turns
-    net, ends = stuck.assembly.net, by_ends(turns, stuck.assembly.at)
+    net, ends, present = stuck.assembly.net, by_ends(turns, stuck.assembly.at), stuck.assembler.relations
     found = judge(
-        stuck.circles, net, draft.chains, stuck.present, stuck.classes, draft.block.id, ends, draft.spelling
+        stuck.circles, net, draft.chains, present, stuck.assembler.classes, draft.block.id, ends, draft.spelling
     )
-    draft.give_up(found, stuck.present)
+    draft.give_up(found, present)
     return "anew"
 
 

@@ -22,6 +22,9 @@ from heapq import heappop, heappush
 from math import inf
 from typing import NamedTuple
 
+from msgspec import Struct
+from msgspec.structs import replace
+
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
 from engage_hri.services.realizer.points import EPSILON, Point
@@ -30,7 +33,7 @@ LAGS_AN_ELEMENT = 32
 """Number of lags that take as long as one element of a block: see `steps`."""
 
 
-class Lag(NamedTuple):
+class Lag(Struct, frozen=True, gc=False):
     """Lower bound: `target` is no earlier than `source` + `seconds`, perhaps negative. reason: the caller's index."""
 
     source: int
@@ -72,23 +75,25 @@ def solve(size: int, lags: Sequence[Lag], past: Mapping[int, Seconds] = {}) -> S
     inner = [lag for lag in lags if lag.target]
     clock = [lag for lag in lags if not lag.target]
     sweeps = (inner, inner[::-1])
+    just = EPSILON / 100
     for number in range(2 * size + 4):
         moved = None
         for lag in sweeps[number % 2]:
-            source, target, seconds, _ = lag
-            at = times[source] + seconds
-            if at > times[target] + EPSILON / 100:
-                times[target] = at
-                causes[target] = lag
-                moved = target
+            at = times[lag.source] + lag.seconds
+            if at > times[lag.target] + just:
+                moved = lag.target
+                times[moved] = at
+                causes[moved] = lag
         if number and moved is not None and (cycles := _cycles(causes)):
             raise PositiveCycle(cycles)
         if moved is None:
-            late = [lag for lag in clock if times[lag.source] + lag.seconds > times[0] + EPSILON / 100]
+            late = [lag for lag in clock if times[lag.source] + lag.seconds > times[0] + just]
             if not late:
                 return Solution(times, causes)
             late.sort(key=lambda lag: times[lag.source] + lag.seconds, reverse=True)
-            if cycles := _round_trips(late, causes, {lag.target: lag for lag in inner if lag[::2] == (0, 0.0)}):
+            if cycles := _round_trips(
+                late, causes, {lag.target: lag for lag in inner if lag.source == 0 == lag.seconds}
+            ):
                 raise PositiveCycle(cycles)
             times[0], causes[0] = times[late[0].source] + late[0].seconds, late[0]
     raise AssertionError("every transition moved once too often, yet no cycle of causes")  # pragma: no cover
@@ -234,7 +239,7 @@ def _shortened(cycle: tuple[Lag, ...], room: list[Seconds], excess: Seconds) -> 
         return []
     shares = [each / total for each in room]
     return [
-        lag._replace(seconds=lag.seconds - excess * share) for lag, share in zip(cycle, shares, strict=True) if share
+        replace(lag, seconds=lag.seconds - excess * share) for lag, share in zip(cycle, shares, strict=True) if share
     ]
 
 

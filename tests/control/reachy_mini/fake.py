@@ -14,8 +14,8 @@ from random import Random
 import msgspec
 
 from engage_hri.schemas.faults import Fault
+from engage_hri.services.control.bases.linked import Link, Lost
 from engage_hri.services.control.reachy_mini import joints
-from engage_hri.services.control.reachy_mini.link import Daemon, Lost
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 
 TICK = 0.02
@@ -88,7 +88,7 @@ class FakeDaemon:
     # -- as a connection ----------------------------------------------------------------------------------------
 
     @asynccontextmanager
-    async def __call__(self, settings: ReachyMiniSettings) -> AsyncIterator[Daemon]:
+    async def __call__(self, settings: ReachyMiniSettings) -> AsyncIterator[Link]:
         if not self.is_running:
             raise Lost(Fault(reason=f"the daemon at {settings.url} cannot be reached: refused", advice="start it"))
         await self._answer()

@@ -12,9 +12,9 @@ pytest.importorskip("aiohttp", reason="the extra reachy-mini is not installed")
 
 from aiohttp import WSMsgType, web
 
-from engage_hri.services.control.reachy_mini import link
+from engage_hri.services.control.bases.linked import Link, Lost
+from engage_hri.services.control.reachy_mini import messages
 from engage_hri.services.control.reachy_mini.connection import connected
-from engage_hri.services.control.reachy_mini.link import Daemon, Lost
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 
 pytestmark = pytest.mark.real_time
@@ -104,8 +104,8 @@ async def server() -> AsyncIterator[Server]:
 
 async def test_it_reads_measurements_and_writes_targets_in_the_daemon_s_frame(server: Server):
     async with connected(ReachyMiniSettings(url=server.url)) as daemon:
-        measured = link.read(await daemon.measurement())
-        await daemon.command(link.target(measured.pose))
+        measured = messages.read(await daemon.measurement())
+        await daemon.command(messages.target(measured.pose))
 
     assert measured.pose == pytest.approx(
         {"head_yaw": 0.3, "head_pitch": -0.2, "head_roll": -0.1, "body_yaw": 0.05, "body_lean": 0.0,
@@ -126,7 +126,7 @@ async def test_it_answers_the_pings_of_the_daemon_without_which_that_hangs_up(se
         await server.pongs.wait()
 
 
-async def insist(daemon: Daemon) -> None:
+async def insist(daemon: Link) -> None:
     """Send targets until that fails."""
     async with asyncio.timeout(5.0):
         while True:
@@ -202,8 +202,8 @@ async def test_what_is_wrong_with_a_daemon_is_told_in_its_words(
     "text", ["", "{}", "[]", '{"head_pose": {}}', json.dumps({**STATE, "antennas_position": [1.0]})]
 )
 def test_what_is_no_measurement_is_refused(text: str):
-    with pytest.raises(ValueError):
-        link.read(text)
+    with pytest.raises(Lost, match="no measurement"):
+        messages.read(text)
 
 
 @pytest.mark.parametrize(

@@ -10,11 +10,12 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import FaceLexeme, Gaze, GazeShift, Head, Posture, PostureShift
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.control.bases.watch import settling
 from engage_hri.services.control.contract.body import BodyFailed, Reached
 from engage_hri.services.control.motion.path import JointMotion, resting
 from engage_hri.services.control.reachy_mini import joints
 from engage_hri.services.control.reachy_mini.body import ReachyMini
-from engage_hri.services.control.reachy_mini.moves import FRAME, NEAR, SHORTEST, Moves, settling
+from engage_hri.services.control.reachy_mini.moves import FRAME, NEAR, SHORTEST, Moves
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 from engage_hri.services.control.testing import WORLD, Stage, performed
 from engage_hri.services.control.testing.findings import aside
@@ -306,7 +307,7 @@ def test_joints_that_follow_late_are_expected_at_their_goal_not_before_and_soon_
         step for step, place in enumerate(places) if abs(place - home[0] - yaw) <= limit
     )  # it only comes nearer
 
-    told = settling("head", path, path.length, lag)
+    told = settling(path, path.length, lag, [NEAR[each.joint] for each in joints.TRACKS["head"]], FRAME)
 
     assert 0 < near < 16_000
     assert told == pytest.approx(lag * (1.0 - near // 1000 / 16) + FRAME / 2)  # in sixteenths, rounded up

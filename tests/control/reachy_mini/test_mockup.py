@@ -17,11 +17,11 @@ import pytest
 
 from engage_hri.schemas.behaviors import BlockBehavior, FaceLexeme, Gaze, GazeShift, Head, Posture, PostureShift, Wait
 from engage_hri.schemas.faults import Fault, RunFailed
+from engage_hri.services.control.bases.linked import Link
 from engage_hri.services.control.contract.body import Body, BodyFailed
-from engage_hri.services.control.reachy_mini import link
+from engage_hri.services.control.reachy_mini import messages
 from engage_hri.services.control.reachy_mini.body import ReachyMini
 from engage_hri.services.control.reachy_mini.connection import connected
-from engage_hri.services.control.reachy_mini.link import Daemon
 from engage_hri.services.control.reachy_mini.settings import ReachyMiniSettings
 from engage_hri.services.control.testing import WORLD, BodyContract, LawBroken, Stage, performed
 from engage_hri.services.control.testing.findings import aside
@@ -68,7 +68,7 @@ class Witness:
         self.times: list[float] = []
 
     @asynccontextmanager
-    async def __call__(self, settings: ReachyMiniSettings) -> AsyncIterator[Daemon]:
+    async def __call__(self, settings: ReachyMiniSettings) -> AsyncIterator[Link]:
         async with connected(settings) as self._daemon:
             self.times = []
             yield self
@@ -308,7 +308,7 @@ async def _followed(connect: Callable[[], object]) -> tuple[float, float, float]
         await _go_home(daemon)
         began, seen = loop.time(), []
         while (now := loop.time()) < began + 1.2:
-            yaw = link.read(await daemon.measurement()).pose["head_yaw"]
+            yaw = messages.read(await daemon.measurement()).pose["head_yaw"]
             now = loop.time()
             seen.append((now - began, yaw))
             await daemon.command(_target(_course(now - began)))
@@ -328,9 +328,9 @@ def _course(at: float) -> float:
     return 0.25 * (1.0 - math.cos(2.0 * max(0.0, at)))
 
 
-async def _go_home(daemon: Daemon) -> None:
+async def _go_home(daemon: Link) -> None:
     """Lead the head to where the course begins, slowly."""
-    here = link.read(await daemon.measurement()).pose
+    here = messages.read(await daemon.measurement()).pose
     for step in range(1, 16):
         share = 1.0 - step / 15
         await daemon.command(_target(share * here["head_yaw"], share * here["head_pitch"]))
@@ -339,4 +339,4 @@ async def _go_home(daemon: Daemon) -> None:
 
 def _target(yaw: float, pitch: float = 0.0) -> str:
     pose = {"head_yaw": yaw, "head_pitch": pitch, "head_roll": 0.0, "body_yaw": 0.0, "body_lean": 0.0}
-    return link.target({**pose, "right_antenna": HOME["right"], "left_antenna": HOME["left"]})
+    return messages.target({**pose, "right_antenna": HOME["right"], "left_antenna": HOME["left"]})
