@@ -190,6 +190,7 @@ class Fragments:
     def recognition_gone(self, now: Seconds) -> None:
         """Start the grace after which the open events are lost: recognition may only be cut off."""
         self._waits.set(_RECOGNITION_AWAY, now + GRACE)
+        self._turns.interjections.recognition_gone()
 
     def recognition_there(self, session: str, now: Seconds) -> None:
         self._waits.clear(_RECOGNITION_AWAY)

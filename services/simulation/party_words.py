@@ -1,4 +1,4 @@
-"""What people who talk among themselves say: replies fit what was said, and answers what was asked. Pure."""
+"""Words of people who talk among themselves: replies fit what was said, and answers what was asked. Pure."""
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.client.people.actions import WORD, speaking_time

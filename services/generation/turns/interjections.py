@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Mapping
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.fragments import Interjected
 from engage_hri.schemas.recognition import Interjection
@@ -22,7 +23,8 @@ class _Kept(Struct):
     """turn: the turn that it was said into. told: its last news. began: when it was told first.
 
     counts_from: when the robot heeds it if the voice goes on until then; None: it may not interrupt, or has fallen
-    silent before. is_heeded: the robot does. waits: it waits for the reading. is_voiced: the voice goes on.
+    silent before. is_heeded: the robot does. waits: it waits for the reading. is_voiced: the voice goes on. words:
+    heard of it that are more than a listener's. is_orphan: recognition has gone since, so that these decide.
     """
 
     turn: str
@@ -32,6 +34,8 @@ class _Kept(Struct):
     is_heeded: bool = False
     waits: bool = False
     is_voiced: bool = True
+    words: str = ""
+    is_orphan: bool = False
     held: Seconds = 0.0
     went_on: bool = False
 
@@ -143,11 +147,31 @@ class Interjections:
             each.told = renamed(each.told, name)
         self._kept = {(name(actor), since): each for (actor, since), each in self._kept.items()}
 
-    def give_up(self, actor: str, now: Seconds) -> None:
-        """Wait for the readings of this person's speeches no longer: nobody has told them in time."""
+    def hear(self, actor: str, words: str) -> None:
+        """Note words, more than a listener's, of a speech that waits for its reading."""
         for each in self._kept.values():
             if each.waits and each.told.actor == actor:
-                self._release(each, now, went_on=True)
+                each.words = words
+
+    def give_up(self, actor: str, now: Seconds) -> bool:
+        """Wait for the readings of this person's speeches no longer: nobody has told them in time.
+
+        True: recognition has gone, and words have been heard by which one takes the floor.
+        """
+        takes_floor = False
+        for each in self._kept.values():
+            if each.waits and each.told.actor == actor:
+                is_floor = each.is_orphan and bool(each.words)
+                if is_floor:
+                    each.told = replace(each.told, reading="interruption", words=each.words)
+                self._release(each, now, went_on=not is_floor)
+                takes_floor |= is_floor
+        return takes_floor
+
+    def recognition_gone(self) -> None:
+        """Note that nobody may say what the speeches are that wait."""
+        for each in self._kept.values():
+            each.is_orphan |= each.waits
 
     def decide_wordless(self, actor: str, now: Seconds, *, has_words: bool) -> bool:
         """Decide what this person says without words. has_words: by now it has. True: it takes the floor."""

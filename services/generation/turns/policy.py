@@ -284,10 +284,13 @@ class TurnPolicy:
             self._taken_by = told.actor
 
     def hear(self, utterance: Utterance, now: Seconds) -> None:
-        """Note words, by which a voice without any may turn out to interrupt."""
-        says_more = says_words(utterance.text) and not is_listening(utterance.text)
-        if utterance.final and says_more and self.interjections.decide_wordless(utterance.actor, now, has_words=True):
-            self._taken_by = utterance.actor
+        """Note words, by which a voice without any may turn out to interrupt, or one that nobody decides."""
+        actor, text = utterance.actor, utterance.text
+        if not utterance.final or not says_words(text) or is_listening(text):
+            return
+        self.interjections.hear(actor, text)
+        if self.interjections.decide_wordless(actor, now, has_words=True):
+            self._taken_by = actor
 
     @property
     def held(self) -> str:
@@ -347,7 +350,8 @@ class TurnPolicy:
         why, who = self._waits.due(now) or ("", "")
         while why in ("undecided", "counts", "lasts"):
             if why == "undecided":
-                self.interjections.give_up(who, now)
+                if self.interjections.give_up(who, now):
+                    self._taken_by = who
             elif why == "lasts":
                 if self.interjections.decide_wordless(who, now, has_words=False):
                     self._taken_by = who

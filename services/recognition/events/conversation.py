@@ -82,10 +82,6 @@ class Conversation:
     def robot_holds_floor(self) -> bool:
         return self.robot_speaks_since is not None or self.pair.robot_holds_turn
 
-    @property
-    def holds_floor(self) -> bool:
-        return self._speech is not None
-
     def is_into_turn(self, at: Seconds) -> bool:
         """True if what the person does at `at` is in the robot's turn. It may be known only now, and be earlier."""
         if self.pair.event is not None and self.pair.robot_holds_turn:
@@ -153,7 +149,7 @@ class Conversation:
     def gestures(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> None:
         """Take a nod, a shake or a point of the person."""
         sign = self.listener.sign
-        if self.holds_floor and (sign is None or not sign.going_on("speak")):
+        if self._speech is not None and (sign is None or not sign.going_on("speak")):
             return  # it goes with the person's own words, and says nothing more
         if self.robot_holds_floor or (sign is not None and sign.until is None):
             self.listener.begins(SignPart(action, at, confidence))
@@ -188,17 +184,13 @@ class Conversation:
         self.robot_backchannel.person_gone(at, until)
         self._speech = None
 
-    def resumes(self, event: OngoingEvent, at: Seconds) -> None:
-        """Go on with a pair of a former life of recognition."""
-        self.pair.resume(event, at, by_robot=event.responder == self.id)
-
     # -- the robot ----------------------------------------------------------------------------------------------
 
     def robot_speaks(self, at: Seconds, *, listens: bool) -> None:
         """Take the beginning of the robot's speech. listens: it is a backchannel that was announced."""
         self.robot_speaks_since = self._turned_at = at
         self.pair.robot_heard(None)
-        if self.holds_floor and not self.pair.robot_holds_turn:
+        if self._speech is not None and not self.pair.robot_holds_turn:
             if self.robot_backchannel.state != BRIEF and not self.pair.is_cut_into:
                 self.robot_backchannel.speaks(self._robots_backchannel(at))
         elif not listens:
@@ -218,7 +210,7 @@ class Conversation:
 
     def robot_gestures(self, action: Action, at: Seconds, *, listens: bool) -> None:
         """Take a nod, a shake or a point of the robot. listens: it is a backchannel that was announced."""
-        if not self.holds_floor or action == "point":
+        if self._speech is None or action == "point":
             if not listens:
                 self.pair.robot_begins(action, at)
         elif self.robot_backchannel.state == IDLE:
@@ -316,5 +308,5 @@ class Conversation:
         """Turn undecided speech that outlasts the other's turn into a turn of its own."""
         if not self.robot_holds_floor and not self.listener.is_beside:
             self.listener.robots_turn_ends(at)
-        if self.robot_backchannel.state == UNDECIDED and not self.holds_floor:
+        if self.robot_backchannel.state == UNDECIDED and self._speech is None:
             self._robot_takes_floor(at, "outlasts_turn")

@@ -78,10 +78,6 @@ class Listener:
         self.sign.parts.append(part)
         self.sign.is_wordless = False  # this one's words may come
 
-    def goes_on(self) -> bool:
-        """True while a sign goes on."""
-        return self.sign is not None and self.sign.until is None
-
     @property
     def is_beside(self) -> bool:
         """True while a sign is open that has begun beside the robot's words to others."""
@@ -152,13 +148,10 @@ class Listener:
         Of several parts it is the one that began first. A gesture that answers nothing here stays what it is.
         """
         for part in self.sign.going_on() if self.sign is not None else ():
-            is_answer = not self._is_echo(part) if part.action == "speak" else self._answers_with(part)
-            if is_answer:
+            is_speech = part.action == "speak"
+            if not self._is_echo(part) if is_speech else self._exchange.pair.may_be_answered_with(part.action):
                 self._takes_floor(part, at, reading)
                 return
-
-    def _answers_with(self, part: SignPart) -> bool:
-        return self._exchange.pair.may_be_answered_with(part.action)
 
     def understand(self, since: Seconds, at: Seconds, *, in_turn: bool, is_last: bool) -> None:
         """Judge a speech by its words.
@@ -228,21 +221,18 @@ class Listener:
 
     # -- its words ----------------------------------------------------------------------------------------------
 
-    def _words(self, speech: SignPart) -> str:
-        return self._writer.text_of(self._id, speech.since)
-
     def _is_listening(self, speech: SignPart) -> bool | None:
         """True if the words of a speech are a listener's; None: there are none, as far as is known."""
-        words = self._words(speech)
+        words = self._writer.text_of(self._id, speech.since)
         return is_listening(words) if says_words(words) else None
 
     def _is_noise(self, speech: SignPart) -> bool:
         """True if no words of a speech are known, where they would be."""
-        return self._scene.is_worded and not says_words(self._words(speech))
+        return self._scene.is_worded and self._is_listening(speech) is None
 
     def _is_echo(self, speech: SignPart) -> bool:
         """True if nothing but the robot's own words is known of a speech."""
-        return (self._id, speech.since) in self._scene.echoes and not says_words(self._words(speech))
+        return (self._id, speech.since) in self._scene.echoes and self._is_listening(speech) is None
 
     def _asks_for_nothing(self, speech: SignPart) -> bool:
         """True if a speech is known to be no turn: by a listener's words, or because it is the robot's own words."""

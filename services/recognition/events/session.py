@@ -208,7 +208,12 @@ class Session:
             block=former.block, behavior=former.behavior, turn=former.turn, confidence=former.confidence,
             is_former=True,
         )  # fmt: skip
-        self._people.observe(person, at, lambda person: person.talk.take(at, lambda talk: talk.resumes(event, at)))
+        by_robot = former.initiator == self.robot
+        self._people.observe(
+            person,
+            at,
+            lambda person: person.talk.take(at, lambda talk: talk.pair.resume(event, at, by_robot=by_robot)),
+        )
         return self._take()
 
     def lose_track(self, person: str, at: Seconds) -> list[Effect]:
