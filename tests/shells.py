@@ -24,7 +24,6 @@ SHELLS = {
     "services/control/voice/player.py",  # runs the program that plays
     "services/control/voice/studio.py",  # runs the process of the synthesizer
     "services/control/voice/sounding.py",  # a body that speaks on the loop's clock
-    "services/control/contract/bell.py",  # waits for a moment or a change of authority
     "services/console/web/sessions.py",  # ends sessions whose page does not come back
     "services/perception/hearing/child.py",  # a process with pipes
     "services/perception/hearing/listening.py",  # runs the process of a recognizer

@@ -251,11 +251,11 @@ class Absent(Generic[K]):
         """All, with the time since when; whoever left last comes first."""
         return ((name, self._since[name]) for name in reversed(self._since))
 
-    def forgotten(self, now: Seconds, after: Seconds = FORGOTTEN_AFTER) -> list[K]:
+    def forgotten(self, now: Seconds) -> list[K]:
         """Remove and return those who have been absent for so long."""
         gone = []
         for name, since in self._since.items():
-            if since + after > now:
+            if since + FORGOTTEN_AFTER > now:
                 break
             gone.append(name)
         for name in gone:

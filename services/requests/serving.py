@@ -55,12 +55,11 @@ EACH = 1024
 class EndedRequests:
     """Requests that have ended, by sender, until nobody has spoken of them for `FORGOTTEN_AFTER`.
 
-    Who sends many makes room for them himself: it forgets nobody else's. bytes: what all of them take.
+    Who sends many makes room for them himself: it forgets nobody else's. The last of all is remembered whatever its
+    size. bytes: what all of them take, at most `MOST`.
     """
 
-    def __init__(self, most: int = MOST) -> None:
-        """most: bytes that they may have together. The last of all is remembered whatever its size."""
-        self._most = most
+    def __init__(self) -> None:
         self._of = defaultdict[str, dict[str, Record]](dict)
         """By sender and name; of each the oldest first."""
         self._bytes: dict[str, int] = {}
@@ -81,7 +80,7 @@ class EndedRequests:
         self.bytes += size
         self._quiet.leaves(record, now)
         forgotten = []
-        while self.bytes > self._most:
+        while self.bytes > MOST:
             loudest = max(self._bytes, key=self._bytes.__getitem__)
             oldest = next(iter(self._of[loudest].values()))
             if oldest is record:

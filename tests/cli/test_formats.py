@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from engage_hri.services.commandline.shell import failing_output
+from engage_hri.services.commandline.shell import outputs
 from tests.cli.command import Engage
 
 WORDS = "Grüße, Привет"
@@ -24,8 +24,8 @@ def test_a_format_is_written_as_utf8_on_a_stream_of_any_encoding(monkeypatch: py
         raw = io.BytesIO()
         monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(raw, encoding=encoding))
 
-        failing_output.print_format(WORDS)
-        failing_output.standard_output(encoding=failing_output.FORMAT).write(f"{WORDS}\n")
+        outputs.print_format(WORDS)
+        outputs.standard_output(encoding=outputs.FORMAT).write(f"{WORDS}\n")
 
         assert raw.getvalue().decode() == f"{WORDS}\n" * 2
 

@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas.faults import RunFailed
 from engage_hri.services.commandline.shell import logs
-from engage_hri.services.commandline.shell.failing_output import Patient, complain, without_waiting
-from engage_hri.services.commandline.shell.outputs import Outputs
+from engage_hri.services.commandline.shell.outputs import Outputs, Patient, complain, without_waiting
 from tests.bus.places import free_endpoint
 from tests.cli.command import FRAGMENT, GOOD_BLOCK, Engage, start
 from tests.cli.test_processes import PATIENCE, line

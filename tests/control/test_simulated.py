@@ -27,8 +27,7 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.body import NoPointZone
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.control.contract.bell import Bell
-from engage_hri.services.control.contract.body import Arrived, BehaviorRefused, MovementAuthority
+from engage_hri.services.control.contract.body import Arrived, BehaviorRefused, Bell, MovementAuthority
 from engage_hri.services.control.testing import WORLD, Stage, performed, times
 from engage_hri.services.control.testing.motions import recorded, violations
 from engage_hri.services.control.testing.stage import default

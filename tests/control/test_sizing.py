@@ -12,7 +12,7 @@ from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Gesture, Head, Poi
 from engage_hri.schemas.body import Estimate
 from engage_hri.services.control.config import Slow, Variability
 from engage_hri.services.control.contract.body import Body, MovementAuthority
-from engage_hri.services.control.figure.sizing import SIZES
+from engage_hri.services.control.figure.estimates import SIZES
 from engage_hri.services.control.testing import WORLD, times
 from engage_hri.services.control.testing.motions import Recording, recorded, violations
 from engage_hri.services.control.torso.body import SimulatedBody

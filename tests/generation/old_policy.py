@@ -16,9 +16,8 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import GestureChoice, PairConsidered, ReferenceChoice
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.references.distractors import in_zone
 from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE, Motions, arm_of, hand_of
-from engage_hri.services.generation.references.pairs import ReferenceScene, channel_reliability, reliability
+from engage_hri.services.generation.references.pairs import ReferenceScene, channel_reliability, in_zone, reliability
 from engage_hri.services.generation.references.policy import Choices, Unreferable
 from engage_hri.services.generation.references.sequence import EXPECTED_DELAY
 from tests.generation.tables import in_gaze_cone, in_pointing_cylinder

@@ -10,13 +10,13 @@ from engage_hri.schemas.units import Meters, Radians, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.generation.block.emission import FragmentPlan
 from engage_hri.services.generation.pipeline import planned, planning
-from engage_hri.services.generation.references.distractors import (
+from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE, Motions, Way
+from engage_hri.services.generation.references.pairs import (
     Layout,
+    ReferenceScene,
     in_gaze_cones,
     in_pointing_cylinders,
 )
-from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE, Motions, Way
-from engage_hri.services.generation.references.pairs import ReferenceScene
 
 TANGRAMS = (
     "pink-triangle", "purple-triangle", "yellow-triangle", "red-square", "blue-square", "pink-square",

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas.body import NoPointZone, Ray
 from engage_hri.schemas.world import Entity
-from engage_hri.services.generation.references.distractors import (
+from engage_hri.services.generation.references.pairs import (
     angle_off_axis,
     extent,
     in_zone,

@@ -5,7 +5,7 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.prosody import Prosody, spans
 from engage_hri.schemas.documents.xml_decode import decode_xml
 from engage_hri.schemas.documents.xml_encode import encode_xml
-from engage_hri.services.generation.block.words import lowered
+from engage_hri.services.generation.block.emission import lowered
 
 
 def low(text: str, *marks: Mark, markup: str = "") -> Speech:

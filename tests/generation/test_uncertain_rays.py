@@ -8,7 +8,7 @@ import pytest
 
 from engage_hri.schemas.body import Ray
 from engage_hri.schemas.world import Entity
-from engage_hri.services.generation.references.distractors import laid_out
+from engage_hri.services.generation.references.pairs import laid_out
 from tests.generation.tables import in_gaze_cone, in_pointing_cylinder
 
 EYES = Ray(origin=(0.0, 0.0, 1.0), axis=(0.0, 0.0, -1.0))

@@ -14,9 +14,8 @@ import typer
 from msgspec.structs import replace
 
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.services.commandline.shell.failing_output import print_format
 from engage_hri.services.commandline.shell.options import Configured
-from engage_hri.services.commandline.shell.outputs import Terminal
+from engage_hri.services.commandline.shell.outputs import Terminal, print_format
 from engage_hri.services.commandline.shell.process import DONE, end_like_ctrl_c
 from engage_hri.services.commandline.shell.sources import read_world
 from engage_hri.services.runtime.installation import extra_command

@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
-from engage_hri.services.commandline.shell.failing_output import print_format
+from engage_hri.services.commandline.shell.outputs import print_format
 from engage_hri.services.commandline.shell.process import DONE
 
 NEXT = """\

@@ -16,9 +16,8 @@ from engage_hri.schemas.messages import Message, line
 from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ConnectionEvent, Floor, Interjection, Statistics
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.commandline.shell.failing_output import FORMAT, Patient, as_file, settle, standard_output
 from engage_hri.services.commandline.shell.options import Connected
-from engage_hri.services.commandline.shell.outputs import Terminal
+from engage_hri.services.commandline.shell.outputs import FORMAT, Patient, Terminal, as_file, settle, standard_output
 from engage_hri.services.commandline.shell.process import DONE, forever, run_until_signal, unique_name
 from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.console.follow import FOLLOWED, Sink, following

@@ -19,8 +19,8 @@ from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Hub
 from engage_hri.services.commandline.look.https import server_keys
-from engage_hri.services.commandline.shell.failing_output import complain
 from engage_hri.services.commandline.shell.options import Shown
+from engage_hri.services.commandline.shell.outputs import complain
 from engage_hri.services.commandline.shell.process import unique_name
 from engage_hri.services.runtime.installation import extra_command
 

@@ -7,9 +7,8 @@ from typing import Annotated
 import typer
 
 from engage_hri.services.bus.config import BusConfig
-from engage_hri.services.commandline.shell.failing_output import print_format
 from engage_hri.services.commandline.shell.options import Connected
-from engage_hri.services.commandline.shell.outputs import Terminal
+from engage_hri.services.commandline.shell.outputs import Terminal, print_format
 from engage_hri.services.commandline.shell.process import DONE, run
 from engage_hri.services.doctor.findings import findings
 from engage_hri.services.doctor.report import as_json, report

@@ -12,7 +12,7 @@ import typer
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.bus.config import BusConfig
-from engage_hri.services.commandline.shell.failing_output import print_format
+from engage_hri.services.commandline.shell.outputs import print_format
 from engage_hri.services.commandline.shell.process import DONE, FAILED
 from engage_hri.services.runtime.installation import extra_command
 

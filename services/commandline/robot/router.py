@@ -24,7 +24,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.config import is_encrypted
 from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.bus.keyring import Keys, read_keys
-from engage_hri.services.commandline.shell.failing_output import LOG, Patient, beneath, complain, without_waiting
+from engage_hri.services.commandline.shell.outputs import LOG, Patient, beneath, complain, without_waiting
 from engage_hri.services.commandline.shell.process import FAILED, run_until_signal, until_closed
 from engage_hri.services.commandline.shell.supervisor import (
     each_line,

@@ -11,8 +11,8 @@ import typer
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.bus.interface import Hub
 from engage_hri.services.commandline.shell import roster
-from engage_hri.services.commandline.shell.failing_output import complain
 from engage_hri.services.commandline.shell.options import Embodied, Hearing, Listening
+from engage_hri.services.commandline.shell.outputs import complain
 from engage_hri.services.commandline.shell.process import (
     DONE,
     end_after_the_parent,

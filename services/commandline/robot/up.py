@@ -19,9 +19,8 @@ from engage_hri.services.bus.config import mode_of
 from engage_hri.services.bus.interface import Bus, Hub
 from engage_hri.services.commandline.embedding import services as bound
 from engage_hri.services.commandline.robot.run import ready_line
-from engage_hri.services.commandline.shell.failing_output import complain
 from engage_hri.services.commandline.shell.options import Embodied, Hearing, Listening, Simulated, Written
-from engage_hri.services.commandline.shell.outputs import Outputs
+from engage_hri.services.commandline.shell.outputs import Outputs, complain
 from engage_hri.services.commandline.shell.process import DONE, run_until_signal
 from engage_hri.services.commandline.shell.roster import ROBOT, SENSES, TASK, Groups, complete, groups, widest
 from engage_hri.services.commandline.shell.settings import ELSEWHERE, FROM_PAGES, TRANSCRIPT, RobotConfig

@@ -19,7 +19,7 @@ from engage_hri.schemas.text import printable
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.samples import Often
-from engage_hri.services.commandline.shell.failing_output import Patient, without_waiting
+from engage_hri.services.commandline.shell.outputs import Patient, without_waiting
 
 LEVELS = {name.lower(): getattr(logging, name) for name in ("DEBUG", "INFO", "WARNING", "ERROR")}
 SOURCES = tuple(dict.fromkeys((*journal.NAMED, *keys.ROLES, "peers", "up")))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.services.commandline.shell.failing_output import complain
+from engage_hri.services.commandline.shell.outputs import complain
 from engage_hri.services.runtime.installation import extra_command
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ import typer
 
 from engage_hri.schemas import access, keys
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.services.commandline.shell.failing_output import complain
 from engage_hri.services.commandline.shell.options import Connected
+from engage_hri.services.commandline.shell.outputs import complain
 from engage_hri.services.commandline.shell.process import DONE, FAILED, run_until_signal, unique_name
 from engage_hri.services.commandline.shell.recording_file import needed, recording
 from engage_hri.services.commandline.shell.settings import RobotConfig

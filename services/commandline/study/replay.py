@@ -13,8 +13,8 @@ import typer
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.commandline.shell.failing_output import complain
 from engage_hri.services.commandline.shell.options import Listening
+from engage_hri.services.commandline.shell.outputs import complain
 from engage_hri.services.commandline.shell.process import DONE, run_until_signal, typed
 from engage_hri.services.commandline.shell.recording_file import opened
 from engage_hri.services.commandline.shell.settings import RobotConfig

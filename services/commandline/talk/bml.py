@@ -12,8 +12,8 @@ import typer
 from engage_hri.schemas.blocks import Block, Dialect
 from engage_hri.schemas.documents.dialects import core, in_dialect
 from engage_hri.schemas.documents.xml_encode import encode_xml
-from engage_hri.services.commandline.shell.failing_output import print_format
 from engage_hri.services.commandline.shell.options import Configured, WorldFile
+from engage_hri.services.commandline.shell.outputs import print_format
 from engage_hri.services.commandline.shell.process import DONE
 from engage_hri.services.commandline.shell.sources import read_source, read_world
 from engage_hri.services.commandline.talk.offline_plan import generated

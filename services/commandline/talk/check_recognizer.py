@@ -21,9 +21,8 @@ from msgspec import Struct
 
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.text import utf8
-from engage_hri.services.commandline.shell.failing_output import print_format
 from engage_hri.services.commandline.shell.options import Configured
-from engage_hri.services.commandline.shell.outputs import Terminal
+from engage_hri.services.commandline.shell.outputs import Terminal, print_format
 from engage_hri.services.commandline.shell.process import DONE
 from engage_hri.services.runtime.installation import extra_command
 

@@ -13,9 +13,8 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.world import World
 from engage_hri.services.commandline.embedding import in_memory
 from engage_hri.services.commandline.shell import roster
-from engage_hri.services.commandline.shell.failing_output import print_format
 from engage_hri.services.commandline.shell.options import Embodied, Strict, WorldFile, strict_refusal
-from engage_hri.services.commandline.shell.outputs import Terminal
+from engage_hri.services.commandline.shell.outputs import Terminal, print_format
 from engage_hri.services.commandline.shell.process import DONE, FAILED, readable
 from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.commandline.shell.sources import read_source, read_world, still

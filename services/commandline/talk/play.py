@@ -21,7 +21,6 @@ from engage_hri.services.bus.interface import Hub
 from engage_hri.services.client.language_models import summary_of
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline.embedding import in_memory, services
-from engage_hri.services.commandline.shell.failing_output import complain
 from engage_hri.services.commandline.shell.options import (
     Connected,
     Embodied,
@@ -31,7 +30,7 @@ from engage_hri.services.commandline.shell.options import (
     Written,
     strict_refusal,
 )
-from engage_hri.services.commandline.shell.outputs import Outputs, Terminal
+from engage_hri.services.commandline.shell.outputs import Outputs, Terminal, complain
 from engage_hri.services.commandline.shell.process import DONE, FAILED, REFUSED, readable, run, unique_name
 from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.commandline.shell.sources import InputFile, Thing, read_source, read_world, still

@@ -13,8 +13,7 @@ from engage_hri.schemas.behaviors import Event
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import GestureChoice, PairConsidered, ReferenceChoice, TurnFragment
 from engage_hri.schemas.world import World
-from engage_hri.services.commandline.shell.failing_output import print_format
-from engage_hri.services.commandline.shell.outputs import Terminal
+from engage_hri.services.commandline.shell.outputs import Terminal, print_format
 from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.commandline.shell.sources import InputFile
 from engage_hri.services.commandline.talk.offline_plan import Unplanned, generated

@@ -8,7 +8,7 @@ import msgspec
 import typer
 
 from engage_hri.schemas.tool import MOST_IDS, MOST_LETTERS, Format, is_listed, tool_definition
-from engage_hri.services.commandline.shell.failing_output import complain, print_format
+from engage_hri.services.commandline.shell.outputs import complain, print_format
 from engage_hri.services.commandline.shell.process import DONE
 from engage_hri.services.commandline.shell.sources import read_world
 

@@ -11,11 +11,9 @@ from typing import Any, Generic, Protocol, TypeVar
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.control.contract.bell import Bell
-from engage_hri.services.control.contract.body import MovementAuthority
-from engage_hri.services.control.motion.motion import Motion
+from engage_hri.services.control.contract.body import Bell, MovementAuthority
+from engage_hri.services.control.motion.motion import Motion, MotionPlan, WalkPoint, is_shift
 from engage_hri.services.control.motion.path import Path
-from engage_hri.services.control.motion.points import MotionPlan, WalkPoint, is_shift
 from engage_hri.services.control.motion.track import Track
 
 FREEZE: Seconds = 0.5

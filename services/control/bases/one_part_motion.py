@@ -38,7 +38,7 @@ from engage_hri.services.control.contract.body import (
     MovementAuthority,
 )
 from engage_hri.services.control.contract.refusals import infeasible
-from engage_hri.services.control.motion.points import MotionPlan, WalkPoint
+from engage_hri.services.control.motion.motion import MotionPlan, WalkPoint
 from engage_hri.services.control.motion.track import Track
 
 Angles = Mapping[str, Radians]

@@ -33,10 +33,11 @@ from engage_hri.schemas.behaviors import BlockBehavior, Wait
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.bases.moving_parts import MovingParts, R
 from engage_hri.services.control.bases.watch import PATIENCE, Watch
-from engage_hri.services.control.contract.bell import EARLY, Bell
 from engage_hri.services.control.contract.body import (
+    EARLY,
     Arrived,
     BehaviorRefused,
+    Bell,
     Body,
     MovementAuthority,
     Progress,
@@ -44,7 +45,7 @@ from engage_hri.services.control.contract.body import (
     TakenOver,
 )
 from engage_hri.services.control.contract.refusals import Impossible
-from engage_hri.services.control.motion.points import WalkPoint
+from engage_hri.services.control.motion.motion import WalkPoint
 
 CATCHES_UP: Seconds = 0.02
 """Seconds between two looks at whether it has come to a target that has moved."""

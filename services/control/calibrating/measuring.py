@@ -13,7 +13,6 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Meters, Seconds, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.calibrating.fitting import Measurement
-from engage_hri.services.control.contract.bell import within
 from engage_hri.services.control.contract.body import (
     Arrived,
     BehaviorRefused,
@@ -22,6 +21,7 @@ from engage_hri.services.control.contract.body import (
     BodyState,
     MovementAuthority,
     Progress,
+    within,
 )
 
 ON_TARGET = "stroke"

@@ -39,7 +39,7 @@ from engage_hri.services.control.figure.rehearsal import ClockOfCopy, beside, re
 from engage_hri.services.control.figure.repertoire import Repertoire
 from engage_hri.services.control.figure.runs import Run
 from engage_hri.services.control.figure.torso import Torso
-from engage_hri.services.control.motion.points import is_shift
+from engage_hri.services.control.motion.motion import is_shift
 from engage_hri.services.control.voice.speaker import Voice, speech_estimate
 from engage_hri.services.control.voice.speaking import speak
 from engage_hri.services.control.voice.timeline import uttered

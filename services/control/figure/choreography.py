@@ -50,8 +50,8 @@ from engage_hri.services.control.figure.course import (
 )
 from engage_hri.services.control.figure.expressions import SETTLE, sides
 from engage_hri.services.control.figure.kinematics import Side, Unreachable
+from engage_hri.services.control.motion.motion import WalkPoint, held_around_stroke, held_on_target
 from engage_hri.services.control.motion.path import Leg
-from engage_hri.services.control.motion.points import WalkPoint, held_around_stroke, held_on_target
 
 SLIDE: Seconds = 0.2
 OFFSETS: Mapping[str, tuple[int, int]] = {

@@ -12,8 +12,8 @@ from engage_hri.schemas.world import World
 from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.figure.aiming import UPRIGHT, Aim
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
+from engage_hri.services.control.motion.motion import MotionPlan, WalkPoint
 from engage_hri.services.control.motion.path import Leg
-from engage_hri.services.control.motion.points import MotionPlan, WalkPoint
 from engage_hri.services.control.motion.track import Trunk
 
 

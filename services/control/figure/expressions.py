@@ -34,8 +34,8 @@ from engage_hri.services.control.figure.course import (
 from engage_hri.services.control.figure.kinematics import Side
 from engage_hri.services.control.figure.repertoire import Absent, Found, GesturePath, HeadPath, Table
 from engage_hri.services.control.figure.tracks import clear_of_table
+from engage_hri.services.control.motion.motion import WalkPoint, held_around_stroke, held_on_target
 from engage_hri.services.control.motion.path import Leg
-from engage_hri.services.control.motion.points import WalkPoint, held_around_stroke, held_on_target
 
 SETTLE: Seconds = 0.08
 DRIFT = radians(0.3)

@@ -16,8 +16,7 @@ from engage_hri.schemas.behaviors import BlockBehavior
 from engage_hri.schemas.body import BodyPose, Estimate, EstimateItem, Phase
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.control.contract.bell import EARLY, Bell
-from engage_hri.services.control.contract.body import MovementAuthority
+from engage_hri.services.control.contract.body import EARLY, Bell, MovementAuthority
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.contract.variability import Deviations
 from engage_hri.services.control.figure import choreography, tracks
@@ -25,9 +24,8 @@ from engage_hri.services.control.figure.course import Course
 from engage_hri.services.control.figure.estimates import beneath_a_look
 from engage_hri.services.control.figure.runs import Run
 from engage_hri.services.control.figure.torso import Torso, is_last_on_target
-from engage_hri.services.control.motion.motion import Motion
+from engage_hri.services.control.motion.motion import Motion, is_shift
 from engage_hri.services.control.motion.path import Path, resting
-from engage_hri.services.control.motion.points import is_shift
 from engage_hri.services.runtime.steps import Steps
 
 RELEASE, BEGIN = 0, 1

@@ -14,10 +14,9 @@ from engage_hri.services.control.contract.body import MovementAuthority
 from engage_hri.services.control.contract.variability import Deviations
 from engage_hri.services.control.figure import choreography
 from engage_hri.services.control.figure.course import Course, Situation
-from engage_hri.services.control.figure.sizing import hurried
-from engage_hri.services.control.motion.motion import Motion
+from engage_hri.services.control.figure.estimates import hurried
+from engage_hri.services.control.motion.motion import Motion, WalkPoint
 from engage_hri.services.control.motion.path import Path
-from engage_hri.services.control.motion.points import WalkPoint
 from engage_hri.services.runtime.steps import Steps
 
 STALL, OVERHEAT = FAULTS = ("(stall)", "(overheat)")

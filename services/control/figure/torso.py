@@ -26,9 +26,8 @@ from engage_hri.services.control.figure.repertoire import Repertoire
 from engage_hri.services.control.figure.runs import Run
 from engage_hri.services.control.figure.table_clearance import ARMS, SHORTEST, ClearOfTable, way_along
 from engage_hri.services.control.figure.tracks import PartTrack
-from engage_hri.services.control.motion.motion import Motion
+from engage_hri.services.control.motion.motion import Motion, WalkPoint, is_shift
 from engage_hri.services.control.motion.path import JointMotion, Leg, Path, resting
-from engage_hri.services.control.motion.points import WalkPoint, is_shift
 from engage_hri.services.runtime.steps import Steps, finished
 
 NOTICEABLE: Meters = 0.01

@@ -28,7 +28,7 @@ from engage_hri.services.control.figure.body import FigureBody
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire, repertoire_of
 from engage_hri.services.control.figure.runs import Run
 from engage_hri.services.control.figure.tracks import PartTrack
-from engage_hri.services.control.motion.points import WalkPoint
+from engage_hri.services.control.motion.motion import WalkPoint
 from engage_hri.services.control.mujoco.described import DescribedBody
 from engage_hri.services.control.mujoco.faults import KINDS, OURS, SHARED, told
 from engage_hri.services.control.mujoco.film import Frame, filming, framed

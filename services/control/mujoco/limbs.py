@@ -13,9 +13,9 @@ from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Meters, Radians, Seconds, Vector
 from engage_hri.schemas.world import World
 from engage_hri.services.control.bases.one_part_motion import OrdinaryBody, Way, refused
-from engage_hri.services.control.contract.bell import Bell
 from engage_hri.services.control.contract.body import (
     BehaviorRefused,
+    Bell,
     BodyState,
     Seen,
 )

@@ -34,7 +34,7 @@ from engage_hri.services.control.contract.body import (
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import choreography
 from engage_hri.services.control.figure.estimates import wait_estimate
-from engage_hri.services.control.motion.points import WalkPoint
+from engage_hri.services.control.motion.motion import WalkPoint
 from engage_hri.services.control.reachy_mini import courses, joints, messages
 from engage_hri.services.control.reachy_mini.idling import Idling
 from engage_hri.services.control.reachy_mini.messages import Measured

@@ -20,8 +20,8 @@ from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import choreography, kinematics
 from engage_hri.services.control.figure.course import Course, Situation
 from engage_hri.services.control.figure.kinematics import Mounting
+from engage_hri.services.control.motion.motion import WalkPoint, held_on_target
 from engage_hri.services.control.motion.path import Leg
-from engage_hri.services.control.motion.points import WalkPoint, held_on_target
 from engage_hri.services.control.reachy_mini import joints
 from engage_hri.services.control.reachy_mini.joints import Angles
 

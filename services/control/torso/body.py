@@ -13,7 +13,7 @@ from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.figure.body import FigureBody, fault
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire, repertoire_of
 from engage_hri.services.control.figure.runs import OVERHEAT, STALL, Run
-from engage_hri.services.control.motion.points import WalkPoint
+from engage_hri.services.control.motion.motion import WalkPoint
 
 
 class SimulatedBody(FigureBody):

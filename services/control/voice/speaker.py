@@ -16,9 +16,9 @@ from engage_hri.schemas.documents.prosody import unread
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.world import World
-from engage_hri.services.control.contract.bell import Bell
 from engage_hri.services.control.contract.body import (
     BehaviorRefused,
+    Bell,
     Body,
     BodyFailed,
     BodyState,

@@ -19,9 +19,10 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.text import tokens
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.contract.bell import EARLY, Bell
 from engage_hri.services.control.contract.body import (
+    EARLY,
     Arrived,
+    Bell,
     BodyFailed,
     MouthShape,
     MovementAuthority,

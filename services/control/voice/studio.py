@@ -35,7 +35,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.control.contract.bell import Bell
+from engage_hri.services.control.contract.body import Bell
 from engage_hri.services.control.voice.clauses import Clause
 from engage_hri.services.control.voice.synthesis import Phrase, SynthesisFailed, Synthesizer
 from engage_hri.services.control.voice.worker import HEAD, Answer, Failed, Made, Order, Spoken, packed

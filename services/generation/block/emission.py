@@ -3,6 +3,10 @@
 Events are behaviors of the block, so they begin exactly when the speech or gaze they belong to does. They carry
 their timing inline: the constraints that remain, but for the hold of a point until its event has ended, are
 plain BML.
+
+Words are given as a voice needs them. A voice can't say a comma alone: in "[the red cup], please" the phrase becomes
+"the red cup,", and "please" is left of the speech. The last words of a turn are lower, a signal that it is over
+(thesis 3.3.1).
 """
 
 import re
@@ -19,6 +23,7 @@ from engage_hri.schemas.behaviors import (
     Constraint,
     Event,
     EventKind,
+    FragmentBehavior,
     Gaze,
     Hand,
     Head,
@@ -33,9 +38,10 @@ from engage_hri.schemas.behaviors import (
     TurnSignal,
 )
 from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.documents.prosody import marked_up
 from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
 from engage_hri.schemas.references import type_name
-from engage_hri.schemas.text import word_count
+from engage_hri.schemas.text import tokens, word_count
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.block.ordering import ordered
 from engage_hri.services.generation.block.parts import (
@@ -49,11 +55,87 @@ from engage_hri.services.generation.block.parts import (
     same,
 )
 from engage_hri.services.generation.block.rewriting import Operator, Rewriting, points_named, tie_needs, tied
-from engage_hri.services.generation.block.words import lowered, moved_punctuation
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.inhibitions import Permits
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation, Stroke, first_met, stroke
 from engage_hri.services.generation.turns.policy import TurnPlan
+
+_ALPHABETIC = r"""(?:['’](?:s|d|m|ll|re|ve)\b)?[.,;:!?…)\]"'”’»]*(?=\s|$)"""
+_IDEOGRAPHIC = "[、。，．；：！？…）］」』】》〉]+"
+"""Punctuation that needs no space behind it."""
+_CLOSING = re.compile(rf"\s*({_ALPHABETIC}|{_IDEOGRAPHIC})\s*")
+
+
+class MovedPunctuation(Struct, frozen=True):
+    """Punctuation that was moved to phrases.
+
+    closings: what a reference's phrase ends with, by reference. rest: what is left of a speech, by speech; None:
+    nothing. follows: by speech of which nothing is left, the reference with the phrase that has its punctuation.
+    """
+
+    closings: dict[str, str]
+    rest: dict[str, Speech | None]
+    follows: dict[str, str]
+
+
+def moved_punctuation(order: Sequence[FragmentBehavior], phrased: Collection[str]) -> MovedPunctuation:
+    """Find the punctuation to move. order: that of the voice. phrased: references that are made with a phrase.
+
+    Speech with prosodic markup is left as it is: its words stand in the text and in the markup.
+    """
+    result = MovedPunctuation({}, {}, {})
+    before = ""
+    for behavior in order:
+        if isinstance(behavior, Reference):
+            before = behavior.id if behavior.id in phrased else ""
+        elif isinstance(behavior, Speech) and behavior.text.strip():
+            match = _CLOSING.match(behavior.text)
+            if before and match and match[1] and not behavior.markup:
+                result.closings[before] = result.closings.get(before, "") + match[1]
+                result.rest[behavior.id] = _without_start(behavior, match.end())
+                if match.end() == len(behavior.text):
+                    result.follows[behavior.id] = before
+                    continue
+            before = ""
+    return result
+
+
+def _without_start(speech: Speech, length: int) -> Speech | None:
+    """The speech without its first `length` characters; None if nothing is left."""
+    if length == len(speech.text):
+        return None
+    marks = tuple(Mark(mark.id, max(0, mark.position - length)) for mark in speech.marks)
+    return replace(speech, text=speech.text[length:], marks=marks)
+
+
+WORDS = 2
+"""Last words of the turn that are lowered."""
+PER_WORD = 2
+"""Characters of a script without spaces that count as one word."""
+
+
+def lowered(behaviors: Sequence[BlockBehavior], last: str) -> tuple[BlockBehavior, ...]:
+    """Lower the end of the speech `last`. A speech with prosodic markup stays as its author wrote it."""
+    return tuple(
+        _lowered(each) if isinstance(each, Speech) and each.id == last and not each.markup else each
+        for each in behaviors
+    )
+
+
+def _lowered(speech: Speech) -> Speech:
+    left, start = float(WORDS), len(speech.text)
+    for token in reversed(list(tokens(speech.text))):
+        if not token.letters:
+            continue
+        start = token.end - len(token.text)
+        left -= 1.0 if token.script == "spaced" else 1.0 / PER_WORD
+        if left <= 0.0:
+            break
+    if start == len(speech.text):
+        return speech
+    markup = marked_up(speech.text, speech.marks, start, len(speech.text), pitch="low")
+    return replace(speech, markup=markup)
+
 
 _PHRASE_END = re.compile(r"[.,;:!?…]+(?=\s+\w)|[。、！？，；：]+(?=\w)")
 PHRASE = 2.0

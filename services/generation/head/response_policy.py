@@ -17,7 +17,7 @@ from engage_hri.schemas.fragments import Claim
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.generation.references.distractors import TOLERANCE, angle_off_axis
+from engage_hri.services.generation.references.pairs import TOLERANCE, angle_off_axis
 
 RESPONSE_HOLD: Seconds = 0.8
 """Time that shared gaze lasts before the response lets go. Thesis 3.3.3 names no time; ours."""

@@ -24,7 +24,7 @@ from engage_hri.schemas.text import word_count
 from engage_hri.schemas.units import Meters
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.generation.config import PhraseAttribute
-from engage_hri.services.generation.references.distractors import extent
+from engage_hri.services.generation.references.pairs import extent
 
 
 class Named(Struct, frozen=True):
