@@ -7,15 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from engage_hri.schemas.faults import Fault, InputRefused
-<<<<<<< HEAD
 from engage_hri.services.commandline.look.window import hosts, served, stage_page, token_of, web, workshop_page
-from engage_hri.services.commandline.shell.failing_output import complain
 from engage_hri.services.commandline.shell.options import Connected, Port, Shown
-=======
-from engage_hri.services.commandline.look.window import TOKEN, hosts, served, stage_page, web, workshop_page
-from engage_hri.services.commandline.shell.options import Connected, Shown
 from engage_hri.services.commandline.shell.outputs import complain
->>>>>>> h-c34
 from engage_hri.services.commandline.shell.process import DONE, forever, run_until_signal, unique_name
 from engage_hri.services.commandline.shell.recording_file import opened
 from engage_hri.services.commandline.shell.settings import RobotConfig

@@ -24,16 +24,9 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline.embedding import services
-<<<<<<< HEAD
 from engage_hri.services.commandline.look.window import can_open, seat_refusal, web, windowed
-from engage_hri.services.commandline.shell.failing_output import LOG, complain
 from engage_hri.services.commandline.shell.options import Embodied, Hearing, Kiosk, Shown, Written
-from engage_hri.services.commandline.shell.outputs import Outputs
-=======
-from engage_hri.services.commandline.look.window import can_open, web, windowed
-from engage_hri.services.commandline.shell.options import Embodied, Hearing, Shown, Written
 from engage_hri.services.commandline.shell.outputs import LOG, Outputs, complain
->>>>>>> h-c34
 from engage_hri.services.commandline.shell.process import DONE, run_until_signal
 from engage_hri.services.commandline.shell.roster import ROBOT, SENSES, complete
 from engage_hri.services.commandline.shell.settings import AT_PAGES, RobotConfig
