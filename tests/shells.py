@@ -26,7 +26,7 @@ SHELLS = {
     "services/control/voice/sounding.py",  # a body that speaks on the loop's clock
     "services/control/contract/bell.py",  # waits for a moment or a change of authority
     "services/console/web/sessions.py",  # ends sessions whose page does not come back
-    "services/perception/hearing/child.py",  # a process with pipes
+    "services/perception.child.py",  # a process with pipes
     "services/perception/hearing/listening.py",  # runs the process of a recognizer
     "services/perception/hearing/microphone.py",  # plays a file, or runs the program that records
     "services/recording/replay.py",  # says what was said
