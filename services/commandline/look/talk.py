@@ -29,7 +29,7 @@ from engage_hri.services.commandline.shell.failing_output import LOG, complain
 from engage_hri.services.commandline.shell.options import Embodied, Hearing, Shown, Written
 from engage_hri.services.commandline.shell.outputs import Outputs
 from engage_hri.services.commandline.shell.process import DONE, run_until_signal
-from engage_hri.services.commandline.shell.roster import ROBOT, SENSES, complete
+from engage_hri.services.commandline.shell.roster import ROBOT, complete
 from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.console.follow import following
 from engage_hri.services.console.terminal.live import scene_view
@@ -146,7 +146,7 @@ async def _talk(
     """Run all services and the manager on a bus in memory. shown: options of the window; None: there is none."""
     began = asyncio.get_running_loop().time()
     tell = partial(console.print, highlight=False, markup=False, soft_wrap=True)
-    names = (*ROBOT, *(SENSES if has_hearing() else ()), "simulation")
+    names = (*ROBOT, *(("hearing",) if has_hearing() else ()), "simulation")
     async with MemoryHub(config.robot, decodes=False) as hub:
         bus = hub.join("console")
         with scene_view(console, config.robot, began, live=False) as show:

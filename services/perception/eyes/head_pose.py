@@ -2,26 +2,34 @@
 
 A rigid face is laid onto the points as a camera would see it (perspective-n-point): the rotation and the place at
 which its points, weighted by how well each is known, are nearest to those of the picture. Mouth and chin move, and
-are left out. The face is not that of one person, so yaw and pitch have an error that grows away from the camera's
-axis; the table has what was left over of both for people of whom the face knew nothing.
+are left out. That makes faces look too much ahead, for nobody has the average face, and who finds the points draws
+them towards it; the points with their depths, as from far away, make another mistake. So yaw and pitch are mended by
+what both ways tell, as far as that has held for people who were not among those from whom the face was learned. What
+is left over then, by how far a head is turned, is the spread.
 
-The face and the table are in `average_face.npz`: `python -m tests.perception.eyes.learning` makes it from rendered
-people, with what this file does not know of a head before a camera.
+The face, what mends it and the spread are in `average_face.npz`, which `python -m tests.perception.eyes.learning`
+makes from rendered people.
 """
 
 from functools import cache
 from importlib.resources import files
-from math import hypot
+from math import cos, hypot, pi, sin
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engage_hri.schemas.units import Meters, Radians
 from engage_hri.services.perception.eyes.looking import Floats
 
-TURNS = 4
-"""Steps of Gauss and Newton: the last one changes nothing any more."""
+MOST_STEPS = 8
+"""Steps of Gauss and Newton."""
+SMALL = 1e-3
+"""Step, in radians and metres, after which the next would change nothing."""
+SMALLEST = 8
+"""Pixels that a face has to be wide and high."""
+LEARNED: Radians = 0.8
+"""Angle from the line of sight up to which the mending was learned."""
+LEAST_SPREAD, MOST_SPREAD = 0.01, pi / 4
 UPPER_LIP, LOWER_LIP, FOREHEAD, CHIN = 13, 14, 10, 152
 AHEAD = np.array([0.0, 0.0, -1.0])
 """Direction of the nose of a face that looks into the camera."""
@@ -29,29 +37,25 @@ AHEAD = np.array([0.0, 0.0, -1.0])
 
 class AverageFace(NamedTuple):
     """A face. points: in the axes of a camera that it faces, from between the eyes, metres. weights: of each point;
-    0: it moves. errors: coefficients of the standard deviation of yaw and of pitch (`spread`)."""
+    0: it moves. mends: coefficients of what is added to yaw and pitch. errors: of their standard deviations."""
 
     points: Floats
     weights: Floats
+    mends: Floats
     errors: Floats
 
 
 class Head(NamedTuple):
-    """A head in camera axes. place: between the eyes, metres. rotation: from a face that looks along the axis.
+    """A head in camera axes. place: between the eyes, metres. ahead: direction of the nose, of length 1.
 
     mouth: gap between the lips as a share of the height of the face. yaw_spread, pitch_spread: standard deviations.
     """
 
     place: Floats
-    rotation: Floats
+    ahead: Floats
     mouth: float
     yaw_spread: Radians
     pitch_spread: Radians
-
-    @property
-    def ahead(self) -> Floats:
-        """Direction of the nose."""
-        return np.asarray(self.rotation @ AHEAD)
 
     @property
     def distance(self) -> Meters:
@@ -62,7 +66,7 @@ class Head(NamedTuple):
 def average_face() -> AverageFace:
     """Load the face. It comes with this package."""
     with (files(__package__ or "") / "average_face.npz").open("rb") as file, np.load(file) as kept:
-        return AverageFace(kept["points"] / 1e5, kept["weights"] / 100, kept["errors"] / 1.0)
+        return AverageFace(kept["points"] / 1e5, kept["weights"] / 100, kept["mends"], kept["errors"])
 
 
 def head(points: Floats, width: int, height: int, focal: float, face: AverageFace | None = None) -> Head | None:
@@ -72,40 +76,55 @@ def head(points: Floats, width: int, height: int, focal: float, face: AverageFac
     the average one.
     """
     face = face or average_face()
+    laid = solved(points, width, height, focal, face)
+    if laid is None:
+        return None
+    yaw, pitch = laid.angles + face.mends @ laid.ways
+    gap = float(np.linalg.norm(points[UPPER_LIP] - points[LOWER_LIP]))
+    tall = float(np.linalg.norm(points[FOREHEAD] - points[CHIN]))
+    spread = np.clip(face.errors @ laid.features, LEAST_SPREAD, MOST_SPREAD).tolist()
+    return Head(laid.place, direction(yaw, pitch), gap / max(tall, 1e-6), *spread)
+
+
+class LaidFace(NamedTuple):
+    """A face on the points of a picture. place: of the head. angles: yaw and pitch.
+
+    ways: what mends these: both ways to them, from the line of sight, and their squares. features: what their error
+    depends on: nothing, and how far the head is turned from the line of sight.
+    """
+
+    place: Floats
+    angles: Floats
+    ways: Floats
+    features: Floats
+
+
+def solved(points: Floats, width: int, height: int, focal: float, face: AverageFace) -> LaidFace | None:
+    """Lay a face onto points, as in `head`, and mend nothing."""
     used = face.weights > 0
     model, weights = face.points[used], face.weights[used]
-    seen = (points[:, :2] - [width / 2, height / 2]) / focal
-    rotation, place = _start(model, weights, seen[used], points[used, 2] / focal)
-    for _ in range(TURNS):
+    seen = (points[used, :2] - [width / 2, height / 2]) / focal
+    if np.ptp(seen, axis=0).min() < SMALLEST / focal:
+        return None
+    rotation, place = _start(model, weights, seen, points[used, 2] / focal)
+    flat = rotation @ AHEAD
+    for _ in range(MOST_STEPS):
         turned = model @ rotation.T
         at = turned + place
         if at[:, 2].min() < 0.05:
             return None
-        flat = at[:, :2] / at[:, 2:]
-        slope = np.zeros((len(at), 2, 3))
-        slope[:, 0, 0] = slope[:, 1, 1] = 1 / at[:, 2]
-        slope[:, :, 2] = -flat / at[:, 2:]
-        rows = np.concatenate([slope @ -_crossing(turned), slope], axis=2) * weights[:, None, None]
-        left = ((seen[used] - flat) * weights[:, None]).reshape(-1)
-        rows = rows.reshape(-1, 6)
+        rows, left = _equations(turned, at, seen, weights)
         step = np.linalg.solve(rows.T @ rows, rows.T @ left)
         rotation, place = turn(np.asarray(step[:3])) @ rotation, place + step[3:]
-    gap = float(np.linalg.norm(points[UPPER_LIP] - points[LOWER_LIP]))
-    tall = float(np.linalg.norm(points[FOREHEAD] - points[CHIN]))
-    return Head(place, rotation, gap / max(tall, 1e-6), *spread(rotation, place, focal, face.errors))
-
-
-def spread(rotation: Floats, place: Floats, focal: float, errors: Floats) -> tuple[Radians, Radians]:
-    """Standard deviations of yaw and pitch. errors: a row for each of both, of what `features` tells."""
-    yaw, pitch = errors @ features(rotation, place, focal)
-    return max(float(yaw), 0.01), max(float(pitch), 0.01)
-
-
-def features(rotation: Floats, place: Floats, focal: float) -> Floats:
-    """What the error depends on: nothing, how far the head is turned from the line of sight, how small it is."""
-    sight = -place / np.linalg.norm(place)
-    beside = float(np.arccos(np.clip(rotation @ AHEAD @ sight, -1, 1)))
-    return np.array([1.0, beside, float(place[2]) / focal * 100])
+        if np.abs(step).max() < SMALL:
+            break
+    ahead = rotation @ AHEAD
+    sight, angles = np.array(yaw_pitch(-place)), np.array(yaw_pitch(ahead))
+    one, other = np.clip([angles - sight, np.array(yaw_pitch(flat)) - sight], -LEARNED, LEARNED)
+    (a, b), (c, d) = one, other
+    ways = np.array([1.0, *one, *other, a * a, b * b, a * b, c * c, d * d, c * d, b * d])
+    beside = float(np.arccos(np.clip(-ahead @ place / np.linalg.norm(place), -1, 1)))
+    return LaidFace(place, angles, ways, np.array([1.0, beside]))
 
 
 def turn(by: Floats) -> Floats:
@@ -122,6 +141,11 @@ def yaw_pitch(direction: Floats) -> tuple[Radians, Radians]:
     """Angles of a direction in camera axes: to the right of the picture and up, from that into the camera."""
     x, y, z = direction
     return float(np.arctan2(x, -z)), float(np.arctan2(-y, hypot(x, z)))
+
+
+def direction(yaw: Radians, pitch: Radians) -> Floats:
+    """Direction of length 1 with these angles (`yaw_pitch`)."""
+    return np.array([sin(yaw) * cos(pitch), -sin(pitch), -cos(yaw) * cos(pitch)])
 
 
 def _start(model: Floats, weights: Floats, seen: Floats, depth: Floats) -> tuple[Floats, Floats]:
@@ -141,9 +165,14 @@ def _start(model: Floats, weights: Floats, seen: Floats, depth: Floats) -> tuple
     return rotation, size * sight - rotation @ centre
 
 
-def _crossing(points: NDArray[np.float64]) -> Floats:
-    """Matrices that take the cross product with each of some points."""
-    made = np.zeros((len(points), 3, 3))
-    made[:, 0, 1], made[:, 0, 2], made[:, 1, 2] = -points[:, 2], points[:, 1], -points[:, 0]
-    made[:, 1, 0], made[:, 2, 0], made[:, 2, 1] = points[:, 2], -points[:, 1], points[:, 0]
-    return made
+def _equations(turned: Floats, at: Floats, seen: Floats, weights: Floats) -> tuple[Floats, Floats]:
+    """How points in the picture follow a turn and a move of the face, and how far they are from where they are seen.
+
+    turned: points of the face after its rotation. at: in camera axes. seen: on a plane at distance 1.
+    """
+    near = weights / at[:, 2]
+    (u, v), (x, y, z), none = (at[:, :2] / at[:, 2:]).T, turned.T, np.zeros(len(at))
+    across = np.stack([-u * y, z + u * x, -y, none + 1, none, -u], 1) * near[:, None]
+    along = np.stack([-z - v * y, v * x, x, none, none + 1, -v], 1) * near[:, None]
+    left = (seen - np.stack([u, v], 1)) * weights[:, None]
+    return np.vstack([across, along]), np.concatenate(left.T)

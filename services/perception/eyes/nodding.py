@@ -5,6 +5,7 @@ between. A look down at the table and up again has a rest, and is none; a single
 from one, and so it is none either.
 """
 
+from collections import deque
 from typing import Literal, NamedTuple
 
 from engage_hri.schemas.units import Radians, Seconds
@@ -19,6 +20,8 @@ REST: Seconds = 0.25
 SWINGS = 3
 OVER: Seconds = 0.7
 """Time without another swing after which the gesture is over."""
+KEPT = 90
+"""Angles that are remembered: three seconds of a fast camera."""
 PURE = 1.5
 """How much wider the swings of a nod are than what the head turns aside meanwhile, and those of a shake than what it
 goes up and down."""
@@ -45,6 +48,7 @@ class SwingingAngle:
 
     def __init__(self) -> None:
         self.row: list[Swing] = []
+        self._recent = deque[tuple[Seconds, Radians]](maxlen=KEPT)
         self._path: list[tuple[Seconds, Radians]] = []
         """The angle since the last turning point."""
         self._sign = 0
@@ -53,6 +57,7 @@ class SwingingAngle:
     def feed(self, angle: Radians, at: Seconds) -> None:
         """Take the angle at an instant later than the last."""
         self._path.append((at, angle))
+        self._recent.append((at, angle))
         for sign in (self._sign,) if self._sign else (1, -1):
             peak = max(self._path, key=lambda one: one[1] * sign)
             if (peak[1] - angle) * sign > WIDE:
@@ -63,6 +68,17 @@ class SwingingAngle:
             self._path = [one for one in self._path if at - one[0] <= QUICK]
         if self.row and at - self.row[-1].until > OVER:
             self.row = []
+
+    @property
+    def width(self) -> Radians:
+        """How wide the last swings in a row are, on average."""
+        last = [swing.wide for swing in self.row[-SWINGS:]]
+        return sum(last) / len(last)
+
+    def extent(self, since: Seconds) -> Radians:
+        """How much the angle has changed since then, as far as it is remembered."""
+        angles = [angle for at, angle in self._recent if at >= since]
+        return max(angles) - min(angles)
 
     def _turn(self, peak: Radians) -> None:
         """Take note of a turning point: where the angle was nearly `peak`, first and last."""
@@ -91,16 +107,17 @@ class Nodding:
         self._pitch.feed(pitch, at)
         self._yaw.feed(yaw, at)
         changes: list[GestureChange] = []
-        nods, shakes = _width(self._pitch), _width(self._yaw)
-        for gesture, swinging, wide, other in (
-            ("nod", self._pitch, nods, shakes), ("shake", self._yaw, shakes, nods),
-        ):  # fmt: skip
-            if len(swinging.row) >= SWINGS and wide > PURE * other:
-                if self._gesture is None:
-                    self._gesture = "nod" if gesture == "nod" else "shake"
-                    changes.append(GestureChange(self._gesture, True, swinging.row[0].since))
-                if self._gesture == gesture:
-                    self._last = swinging.row[-1].until
+        gestures: tuple[tuple[Gesture, SwingingAngle, SwingingAngle], ...] = (
+            ("nod", self._pitch, self._yaw), ("shake", self._yaw, self._pitch),
+        )  # fmt: skip
+        for gesture, swinging, other in gestures:
+            if len(swinging.row) < SWINGS or swinging.width < PURE * other.extent(swinging.row[-SWINGS].since):
+                continue
+            if self._gesture is None:
+                self._gesture = gesture
+                changes.append(GestureChange(gesture, True, swinging.row[0].since))
+            if self._gesture == gesture:
+                self._last = swinging.row[-1].until
         if self._gesture is not None and at - self._last > OVER:
             changes += self.lose()
         return changes
@@ -110,9 +127,3 @@ class Nodding:
         changes = [] if self._gesture is None else [GestureChange(self._gesture, False, self._last)]
         self._gesture, self._pitch, self._yaw = None, SwingingAngle(), SwingingAngle()
         return changes
-
-
-def _width(swinging: SwingingAngle) -> Radians:
-    """How wide the swings in a row are, on average of the last ones."""
-    last = [swing.wide for swing in swinging.row[-SWINGS:]]
-    return sum(last) / len(last) if last else 0.0

@@ -7,7 +7,6 @@
 Angles are filtered for what is told of heads; gestures come from what was measured.
 """
 
-from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +15,7 @@ from engage_hri.schemas.landmarks import FaceLandmarks
 from engage_hri.schemas.units import Meters, Radians, Seconds, Vector
 from engage_hri.services.perception.eyes.camera import StatedCamera
 from engage_hri.services.perception.eyes.config import EyesConfig
-from engage_hri.services.perception.eyes.head_pose import head, yaw_pitch
+from engage_hri.services.perception.eyes.head_pose import direction, head, yaw_pitch
 from engage_hri.services.perception.eyes.looking import unpacked
 from engage_hri.services.perception.eyes.nodding import GestureChange, Nodding
 from engage_hri.services.perception.eyes.one_euro import OneEuro
@@ -25,9 +24,9 @@ from engage_hri.services.perception.eyes.tracking import FaceTracker, TrackedFac
 NEAREST: Meters = 0.15
 FARTHEST: Meters = 5.0
 """Distances between which a head is believed."""
-REST = 1.5
+REST = 0.8
 """Cutoff of the filter for angles while a head stands, Hz."""
-SWIFT = 12.0
+SWIFT = 6.0
 """By how much it grows with each radian a second."""
 PLACE_REST = 1.0
 PLACE_SWIFT = 8.0
@@ -111,7 +110,7 @@ class Seeing:
         told += [PersonGesture(person, each) for each in known.nodding.feed(yaw, pitch, at)]
         place = known.place.feed(face.head.place, at)
         yaw, pitch = known.angles.feed(np.array([yaw, pitch]), at).tolist()
-        ahead = np.array([sin(yaw) * cos(pitch), -sin(pitch), -cos(yaw) * cos(pitch)])
+        ahead = direction(yaw, pitch)
         spread = face.head.yaw_spread, face.head.pitch_spread
         told.append(
             SeenHead(

@@ -54,8 +54,7 @@ async def see(bus: Bus, ready: Ready, config: EyesConfig) -> None:
         tell_settings(bus, "eyes", config)
         eyes = _Eyes(bus, config, inbox)
         try:
-            await eyes.wait_for_recognition(ready)
-            await eyes.watch()
+            await eyes.watch(ready)
         finally:
             eyes.close()
 
@@ -76,9 +75,8 @@ class _Eyes:
         self._is_lost = False
         """No picture comes from the device, which was told."""
 
-    async def wait_for_recognition(self, ready: Ready) -> None:
+    async def _wait_for_recognition(self) -> None:
         """Wait until recognition is there, and for the world."""
-        ready()
         deadline = None
         while (received := await self._inbox.next(deadline)) is not None:
             self._take(received)
@@ -86,18 +84,30 @@ class _Eyes:
                 case PeerAlive(participant="recognition"):
                     deadline = self._bus.now() + LOOK_AROUND
 
-    async def watch(self) -> None:
-        """See all that the source tells; what a device does not give is told, and it is tried again."""
+    async def watch(self, ready: Ready) -> None:
+        """See all that the source tells; what a device does not give is told, and it is tried again.
+
+        ready: called when the source is open, or is a device that will be tried again.
+        """
+        is_ready = False
         while True:
             try:
                 async with aclosing(self._watching.watch()) as told:
                     async for landmarks in told:
+                        if not is_ready:
+                            is_ready = True
+                            ready()
+                            await self._wait_for_recognition()
                         self._catch_up()
                         if landmarks is not None:
                             self._see(landmarks)
                 return
             except SourceLost as lost:
                 self._lose(lost.fault)
+            if not is_ready:
+                is_ready = True
+                ready()
+                await self._wait_for_recognition()
             until = self._bus.now() + AGAIN
             while (received := await self._inbox.next(until)) is not None:
                 self._take(received)

