@@ -26,7 +26,7 @@ SHELLS = {
     "services/control/voice/sounding.py",  # a body that speaks on the loop's clock
     "services/control/contract/bell.py",  # waits for a moment or a change of authority
     "services/console/web/sessions.py",  # ends sessions whose page does not come back
-    "services/perception.child.py",  # a process with pipes
+    "services/perception/child.py",  # a process with pipes
     "services/perception/eyes/packages.py",  # runs pip
     "services/perception/eyes/watching.py",  # runs the process of a source
     "services/perception/eyes/sources/pictures.py",  # a camera, in that process

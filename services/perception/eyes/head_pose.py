@@ -23,7 +23,7 @@ from engage_hri.services.perception.eyes.looking import Floats
 
 MOST_STEPS = 8
 """Steps of Gauss and Newton."""
-SMALL = 1e-3
+SMALL = 5e-3
 """Step, in radians and metres, after which the next would change nothing."""
 SMALLEST = 8
 """Pixels that a face has to be wide and high."""
@@ -45,7 +45,7 @@ class AverageFace(NamedTuple):
     errors: Floats
 
 
-class Head(NamedTuple):
+class MeasuredHead(NamedTuple):
     """A head in camera axes. place: between the eyes, metres. ahead: direction of the nose, of length 1.
 
     mouth: gap between the lips as a share of the height of the face. yaw_spread, pitch_spread: standard deviations.
@@ -69,7 +69,9 @@ def average_face() -> AverageFace:
         return AverageFace(kept["points"] / 1e5, kept["weights"] / 100, kept["mends"], kept["errors"])
 
 
-def head(points: Floats, width: int, height: int, focal: float, face: AverageFace | None = None) -> Head | None:
+def head(
+    points: Floats, width: int, height: int, focal: float, face: AverageFace | None = None
+) -> MeasuredHead | None:
     """Find the head to which points belong; None: these are no points of a face.
 
     points: x, y and depth of each, pixels. width, height: of the picture. focal: of its camera, pixels. face: None:
@@ -83,7 +85,7 @@ def head(points: Floats, width: int, height: int, focal: float, face: AverageFac
     gap = float(np.linalg.norm(points[UPPER_LIP] - points[LOWER_LIP]))
     tall = float(np.linalg.norm(points[FOREHEAD] - points[CHIN]))
     spread = np.clip(face.errors @ laid.features, LEAST_SPREAD, MOST_SPREAD).tolist()
-    return Head(laid.place, direction(yaw, pitch), gap / max(tall, 1e-6), *spread)
+    return MeasuredHead(laid.place, direction(yaw, pitch), gap / max(tall, 1e-6), *spread)
 
 
 class LaidFace(NamedTuple):
@@ -166,13 +168,14 @@ def _start(model: Floats, weights: Floats, seen: Floats, depth: Floats) -> tuple
 
 
 def _equations(turned: Floats, at: Floats, seen: Floats, weights: Floats) -> tuple[Floats, Floats]:
-    """How points in the picture follow a turn and a move of the face, and how far they are from where they are seen.
+    """Slopes of where points are seen by a turn and a move of the face, and how far they are from there.
 
     turned: points of the face after its rotation. at: in camera axes. seen: on a plane at distance 1.
     """
-    near = weights / at[:, 2]
-    (u, v), (x, y, z), none = (at[:, :2] / at[:, 2:]).T, turned.T, np.zeros(len(at))
-    across = np.stack([-u * y, z + u * x, -y, none + 1, none, -u], 1) * near[:, None]
-    along = np.stack([-z - v * y, v * x, x, none, none + 1, -v], 1) * near[:, None]
-    left = (seen - np.stack([u, v], 1)) * weights[:, None]
-    return np.vstack([across, along]), np.concatenate(left.T)
+    (x, y, z), (u, v) = turned.T, at[:, :2].T / at[:, 2]
+    rows = np.zeros((6, 2, len(at)))
+    rows[0, 0], rows[1, 0], rows[2, 0], rows[3, 0], rows[5, 0] = -u * y, z + u * x, -y, 1.0, -u
+    rows[0, 1], rows[1, 1], rows[2, 1], rows[4, 1], rows[5, 1] = -z - v * y, v * x, x, 1.0, -v
+    rows *= weights / at[:, 2]
+    left = (seen.T - np.stack([u, v])) * weights
+    return rows.reshape(6, -1).T, left.reshape(-1)

@@ -71,12 +71,12 @@ class SwingingAngle:
 
     @property
     def width(self) -> Radians:
-        """How wide the last swings in a row are, on average."""
+        """Average width of the last swings in a row."""
         last = [swing.wide for swing in self.row[-SWINGS:]]
         return sum(last) / len(last)
 
     def extent(self, since: Seconds) -> Radians:
-        """How much the angle has changed since then, as far as it is remembered."""
+        """Range of the angle since then, as far as it is remembered."""
         angles = [angle for at, angle in self._recent if at >= since]
         return max(angles) - min(angles)
 

@@ -37,5 +37,5 @@ class OneEuro:
 
 
 def _share(cutoff: float, past: Seconds) -> float:
-    """How much of a new value is taken after some time."""
+    """Share of a new value that is taken after some time."""
     return 1 / (1 + 1 / (2 * pi * cutoff * past))

@@ -1,4 +1,4 @@
-"""From the landmarks of one picture after the other to the people before the camera. Pure.
+"""People before a camera, from the landmarks of one picture after the other. Pure.
 
     seeing = Seeing(config)
     told = seeing.feed(landmarks, at)     # at: of the picture, on any clock, later than the last
@@ -44,14 +44,14 @@ class SeenHead(NamedTuple):
 
 
 class PersonGesture(NamedTuple):
-    """A nod or a shake has begun or ended."""
+    """News that a nod or a shake has begun or ended."""
 
     person: str
     change: GestureChange
 
 
 class PersonCame(NamedTuple):
-    """Somebody is here. at: since when."""
+    """News that somebody is here. at: since when."""
 
     person: str
     place: Vector
@@ -59,7 +59,7 @@ class PersonCame(NamedTuple):
 
 
 class PersonGone(NamedTuple):
-    """Somebody was not seen for long. at: when they were, last."""
+    """News that somebody was not seen for long. at: when they were, last."""
 
     person: str
     at: Seconds
@@ -69,7 +69,7 @@ Seen = PersonCame | SeenHead | PersonGesture | PersonGone
 
 
 class _Known:
-    """What is remembered of somebody."""
+    """Memory of somebody."""
 
     def __init__(self) -> None:
         self.angles, self.place = OneEuro(REST, SWIFT), OneEuro(PLACE_REST, PLACE_SWIFT)

@@ -60,7 +60,7 @@ async def see(bus: Bus, ready: Ready, config: EyesConfig) -> None:
 
 
 class _Eyes:
-    """What is seen. name: of the source."""
+    """State of the service."""
 
     def __init__(self, bus: Bus, config: EyesConfig, inbox: Subscription) -> None:
         self._bus, self._inbox = bus, inbox

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from engage_hri.schemas.units import Meters, Seconds
-from engage_hri.services.perception.eyes.head_pose import Head
+from engage_hri.services.perception.eyes.head_pose import MeasuredHead
 
 GAP: Seconds = 2.0
 """Time for which somebody who is not seen may come back as the same; the same as recognition's."""
@@ -27,24 +27,24 @@ MEMORY: Seconds = 0.3
 
 
 class TrackedFace:
-    """Somebody, or what may be. head: as seen last. since, at: first and last instant. id: empty: nobody yet."""
+    """A face over time. head: as seen last. since, at: first and last instant. id: empty: nobody yet."""
 
-    def __init__(self, head: Head, at: Seconds) -> None:
+    def __init__(self, head: MeasuredHead, at: Seconds) -> None:
         self.head, self.since, self.at, self.id = head, at, at, ""
         self.missed: Seconds = 0.0
         """Time for which the source has looked since, and not seen this face."""
         self._speed = np.zeros(3)
 
-    def distance(self, head: Head, at: Seconds) -> Meters:
-        """How far a head is from where this one should be."""
+    def distance(self, head: MeasuredHead, at: Seconds) -> Meters:
+        """Distance of a head from where this one should be."""
         expected = self.head.place + self._speed * min(at - self.at, MEMORY)
         return float(np.linalg.norm(head.place - expected))
 
     def reach(self, at: Seconds) -> Meters:
-        """How far away it may be from there."""
+        """Distance at which it may be from there."""
         return LEAP + SWIFT * min(at - self.at, MEMORY)
 
-    def follow(self, head: Head, at: Seconds) -> None:
+    def follow(self, head: MeasuredHead, at: Seconds) -> None:
         """Take the head as it is now."""
         past = at - self.at
         share = min(past / MEMORY, 1.0)
@@ -53,7 +53,7 @@ class TrackedFace:
 
 
 class FaceTracker:
-    """Who is before a camera. Ids are `face_1`, `face_2`, and none is given twice."""
+    """People before a camera. Ids are `face_1`, `face_2`, and none is given twice."""
 
     def __init__(self) -> None:
         self._faces: list[TrackedFace] = []
@@ -65,7 +65,7 @@ class FaceTracker:
         """All who are somebody, seen or not."""
         return [face for face in self._faces if face.id]
 
-    def feed(self, heads: Sequence[Head], at: Seconds) -> tuple[list[TrackedFace], list[TrackedFace]]:
+    def feed(self, heads: Sequence[MeasuredHead], at: Seconds) -> tuple[list[TrackedFace], list[TrackedFace]]:
         """Take the heads of the next picture. Returns who is seen in it, and who has gone for good."""
         past = 0.0 if self._at is None else at - self._at
         self._at = at

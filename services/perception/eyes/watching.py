@@ -139,7 +139,7 @@ class OutsideWatching(Watching):
 
 
 class _Answers:
-    """What the process of a source answers, in order."""
+    """Answers of the process of a source, in order."""
 
     def __init__(self, order: SourceOrder) -> None:
         self._name, self._waiting, self._news = order.name, deque[Any](), asyncio.Event()

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engage_hri.services.perception.eyes.head_pose import AHEAD, Head
+from engage_hri.services.perception.eyes.head_pose import AHEAD, MeasuredHead
 from engage_hri.services.perception.eyes.tracking import GAP, FaceTracker
 
 Places = Callable[[float], Iterable[tuple[float, float, float]]]
@@ -22,7 +22,7 @@ class Followed(NamedTuple):
 def followed(places: Places, times: Iterable[float]) -> Followed:
     tracker, here, gone = FaceTracker(), {}, []
     for at in times:
-        heads = [Head(np.array(place), AHEAD, 0.0, 0.1, 0.1) for place in places(at)]
+        heads = [MeasuredHead(np.array(place), AHEAD, 0.0, 0.1, 0.1) for place in places(at)]
         seen, lost = tracker.feed(heads, at)
         here[at] = {face.id: float(face.head.place[0]) for face in seen}
         gone += [(face.id, at) for face in lost]

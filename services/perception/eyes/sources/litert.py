@@ -99,7 +99,7 @@ class FaceFinder:
         return around(self._meshed(image, crop)[0])
 
     def _sought(self, image: Image, *, is_alone: bool) -> Iterator[Crop]:
-        """Where faces may be: in the whole picture, and now and then in parts of it, in which who is far is larger.
+        """Look for faces: in the whole picture, and now and then in parts of it, in which who is far is larger.
 
         is_alone: nobody is known. Then all parts are looked at, unless somebody is near; else one after the other.
         """
@@ -114,7 +114,7 @@ class FaceFinder:
                     yield crop._replace(middle=crop.middle + np.array([left, top]))
 
     def _detected(self, image: Image) -> Iterator[Crop]:
-        """Where faces may be, the surest first."""
+        """Squares in which faces may be, the surest first."""
         height, width = image.shape[:2]
         side = max(width, height)
         square = np.zeros((side, side, 3), np.uint8)

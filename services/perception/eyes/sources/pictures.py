@@ -31,7 +31,7 @@ class CameraBlind(EngageError):
 
 
 class Blindness:
-    """Whether a camera sees anything. No noise is the same twice, so an unchanged picture is an old one."""
+    """Watch over a camera: does it see? No noise is the same twice, so an unchanged picture is an old one."""
 
     def __init__(self) -> None:
         self._last: Image | None = None
