@@ -117,10 +117,13 @@ class FaceFinder:
         """Squares in which faces may be, the surest first."""
         height, width = image.shape[:2]
         side = max(width, height)
-        square = np.zeros((side, side, 3), np.uint8)
-        left, top = (side - width) // 2, (side - height) // 2
-        square[top : top + height, left : left + width] = image
-        small = self._cv2.resize(square, (DETECTED, DETECTED), interpolation=self._cv2.INTER_AREA)
+        wide, tall = max(1, DETECTED * width // side), max(1, DETECTED * height // side)
+        across, down = (DETECTED - wide) // 2, (DETECTED - tall) // 2
+        small = np.zeros((DETECTED, DETECTED, 3), np.uint8)
+        small[down : down + tall, across : across + wide] = self._cv2.resize(
+            image, (wide, tall), interpolation=self._cv2.INTER_AREA
+        )
+        left, top = across * side / DETECTED, down * side / DETECTED
         boxes, scores = self._detect(small / np.float32(127.5) - np.float32(1))
         if boxes.shape[-1] == 1:
             boxes, scores = scores, boxes
