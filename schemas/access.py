@@ -245,7 +245,7 @@ TABLE: tuple[Row, ...] = (
     Row("observer", "subscribes", keys.TURN_CLOSED, _NO_PROGRAM),
     *(
         Row("observer", "subscribes", key, "recorded by `engage record`")
-        for key in (keys.ANY_TAKEN, keys.ROBOT_SEEN, keys.ANY_SETTINGS)
+        for key in (keys.ANY_TAKEN, keys.ROBOT_SEEN, keys.ANY_SETTINGS, keys.ANY_LANDMARKS)
     ),
     *_watches("operator", keys.ANY_ALIVE, "what an operator sees"),
     *_looks("operator", keys.WORLD),

@@ -83,9 +83,16 @@ class Seeing:
         self._camera = StatedCamera(config.field_of_view, config.place, config.tilt, config.pan)
         self._tracker = FaceTracker()
         self._known: dict[str, _Known] = {}
+        self._at = float("-inf")
 
     def feed(self, landmarks: FaceLandmarks, at: Seconds) -> list[Seen]:
-        """Take what a source has found in a picture. Returns what is new, in order."""
+        """Take what a source has found in a picture. Returns what is new, in order.
+
+        In a picture that is no later than the one before nothing is new.
+        """
+        if at <= self._at:
+            return []
+        self._at = at
         focal = self._camera.focal(landmarks.width)
         found = [head(points, landmarks.width, landmarks.height, focal) for points in unpacked(landmarks.faces)]
         heads = [each for each in found if each is not None and NEAREST < each.distance < FARTHEST]

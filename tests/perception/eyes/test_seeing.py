@@ -101,6 +101,16 @@ def test_at_the_end_all_go():
     assert sorted(each.person for each in seeing.end() if isinstance(each, PersonGone)) == ["face_1", "face_2"]
 
 
+def test_a_picture_that_comes_twice_or_late_is_none():
+    seeing = Seeing(EyesConfig())
+    for k in range(10):
+        seeing.feed(landmarks([Pose((0, 0, 1))], k / RATE), k / RATE)
+
+    assert seeing.feed(landmarks([Pose((0, 0, 1))], 9 / RATE), 9 / RATE) == []
+    assert seeing.feed(landmarks([Pose((0.2, 0, 1))], 5 / RATE), 5 / RATE) == []
+    assert len(seeing.feed(landmarks([Pose((0, 0, 1))], 10 / RATE), 10 / RATE)) == 1
+
+
 def test_what_is_too_far_to_be_a_head_is_none():
     assert heads(EyesConfig(), [Pose((0, 0, 7.0))] * 20) == []
 
