@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tests.perception.eyes.people import Light, Looks, Person, Picture, Pose, blurred, drawn, noisy
+from tests.perception.eyes.drawing import Picture
+from tests.perception.eyes.people import Light, Looks, Person, Pose, blurred, drawn, noisy
 
 CHUNKS = 2
 """Parts in which the cases of one person are made, each with chance of its own."""

@@ -38,7 +38,7 @@ class Nearest(NamedTuple):
 
     def of(self, triangles: Ints, values: Floats) -> Floats:
         """Values of the corners, as they are at these pixels."""
-        return np.einsum("nk,nkc->nc", self.shares, values[triangles[self.triangle]])
+        return np.asarray(np.einsum("nk,nkc->nc", self.shares, values[triangles[self.triangle]]))
 
 
 def nearest(points: Floats, triangles: Ints, lens: Lens) -> Nearest:
@@ -82,7 +82,7 @@ def normals(points: Floats, triangles: Ints) -> Floats:
     for axis in range(3):
         for corner in range(3):
             found[:, axis] += np.bincount(triangles[:, corner], sides[:, axis], len(points))
-    return found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-12)
+    return np.asarray(found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-12))
 
 
 def shadows(points: Floats, triangles: Ints, seen: Floats, light: Floats, fine: int = 256) -> Floats:

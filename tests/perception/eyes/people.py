@@ -182,7 +182,7 @@ class Person:
         which, by = _target(name)
         found = np.zeros(len(self._points))
         found[which] = np.linalg.norm(by, axis=1)
-        return found / found.max()
+        return np.asarray(found / found.max())
 
     def _ball(self, group: str) -> tuple[Floats, float]:
         points = self._points[np.unique(self._groups[group])]
@@ -245,7 +245,8 @@ class Person:
         is_ear = (np.abs(x) > 0.62) & (y < 0.25) & (y > -0.75) & (z < -0.5) & (z > -1.35)
         cap = np.clip(np.where(is_ear, 0, cap) * (y > -0.9), 0, 1)[:, None]
         color = color * (1 - cap) + hair * strand[:, None] * cap
-        return np.where((rest[:, 1] < self._neck[1] + 0.1)[:, None], self._shirt * (1 + 0.1 * strand[:, None]), color)
+        shirt = self._shirt * (1 + 0.1 * strand[:, None])
+        return np.asarray(np.where((rest[:, 1] < self._neck[1] + 0.1)[:, None], shirt, color))
 
     def draw(self, pose: Pose, light: Light, lens: Lens, canvas: Floats, depth: Floats) -> None:
         """Draw onto a canvas (0..1) what is nearer there than `depth`."""

@@ -124,7 +124,7 @@ class FaceFinder:
             image, (wide, tall), interpolation=self._cv2.INTER_AREA
         )
         left, top = across * side / DETECTED, down * side / DETECTED
-        boxes, scores = self._detect(small / np.float32(127.5) - np.float32(1))
+        boxes, scores = self._detect(small.astype(np.float32) / 127.5 - 1)
         if boxes.shape[-1] == 1:
             boxes, scores = scores, boxes
         score, box = scores.ravel(), boxes.reshape(-1, 8, 2) / DETECTED
@@ -153,7 +153,7 @@ class FaceFinder:
             image, shift, (MESHED, MESHED), flags=self._cv2.INTER_LINEAR | self._cv2.WARP_INVERSE_MAP,
             borderMode=self._cv2.BORDER_REPLICATE,
         )  # fmt: skip
-        values, score = self._mesh(patch / np.float32(255))
+        values, score = self._mesh(patch.astype(np.float32) / 255)
         if values.size == 1:
             values, score = score, values
         mesh = values.reshape(FACE_POINTS, 3).astype(np.float64)
