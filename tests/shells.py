@@ -25,7 +25,10 @@ SHELLS = {
     "services/control/voice/studio.py",  # runs the process of the synthesizer
     "services/control/voice/sounding.py",  # a body that speaks on the loop's clock
     "services/console/web/sessions.py",  # ends sessions whose page does not come back
-    "services/perception/hearing/child.py",  # a process with pipes
+    "services/perception/child.py",  # a process with pipes
+    "services/perception/eyes/packages.py",  # runs pip
+    "services/perception/eyes/watching.py",  # runs the process of a source
+    "services/perception/eyes/sources/pictures.py",  # a camera, in that process
     "services/perception/hearing/listening.py",  # runs the process of a recognizer
     "services/perception/hearing/microphone.py",  # plays a file, or runs the program that records
     "services/recording/replay.py",  # says what was said

@@ -61,8 +61,11 @@ LAYERS = {
     " keyring",
     "services/control": "mujoco reachy_mini torso > figure service testing > bases calibrating serving voice"
     " > contract > config motion",
+    "services/perception": "eyes hearing > child",
+    "services/perception/eyes": "service > watching > sources > seeing > nodding tracking"
+    " > camera head_pose one_euro > looking > packages > config",
     "services/perception/hearing": "service > device pages > intake > speeches"
-    " > company listening microphone own_voice recognizers > child recognizing sound > voice > config",
+    " > company listening microphone own_voice recognizers > recognizing sound > voice > config",
     "services/commandline": "look robot study talk > app bodies embedding > shell",
     "services/client": "language_models > robot > orders > feeds people > chunking event_stream inputs",
     "services/generation": "service > intake > fragments > performance > acts > fragment_check pipeline"

@@ -49,6 +49,7 @@ CONTENTS = {
         "realizer",
         "recognition",
         "hearing",
+        "eyes",
         "control",
         "mujoco",
         "reachy-mini",

@@ -34,6 +34,7 @@ FAMILIES: dict[str, dict[str, str]] = {
         "router": "Pass on what the processes of several machines send one another, until Ctrl-C.",
         "keys": "Make certificates for all that take part (init, add, renew, revoke), show when they expire "
         "(show), and print the rules of who may do what (acl).",
+        "eyes": "Fetch the models by which eyes find faces, from PyPI or a folder (eyes install).",
         "doctor": "Tell who sees whom, what is wrong, and what to do. Exit 1 if something is wrong.",
     },
     "talk": {

@@ -101,7 +101,7 @@ async def play_tangram(
     hears: hearing runs as well.
     """
     async with MemoryHub(config.robot, decodes=False) if hub is None else nullcontext(hub) as hub:
-        bound = services(config, *roster.PLAY, *(roster.SENSES if hears else ()))
+        bound = services(config, *roster.PLAY, *(("hearing",) if hears else ()))
         kept = recording(hub.join("record"), record, (keys.EVERYTHING,), {}) if record else nullcontext()
         bus = hub.join("console")
         try:

@@ -78,8 +78,8 @@ def _from_here(path: Path) -> str:
 if TYPE_CHECKING:
     from importlib.metadata import Distribution, EntryPoint
 
-GROUPS = BODIES, VOICES, SERVICES, RECOGNIZERS = (
-    "engage.bodies", "engage.voices", "engage.services", "engage.recognizers",
+GROUPS = BODIES, VOICES, SERVICES, RECOGNIZERS, LANDMARKS = (
+    "engage.bodies", "engage.voices", "engage.services", "engage.recognizers", "engage.landmarks",
 )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ import asyncio
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 import zenoh
 
@@ -19,11 +20,14 @@ from engage_hri.services.client.robot import Robot
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.console.follow import following
+from engage_hri.services.perception.eyes.config import EyesConfig
 from engage_hri.services.perception.hearing.config import HearingConfig
 from engage_hri.services.runtime.service import Ready, running
 from engage_hri.services.simulation.still import show_world, table_world
 from engage_hri.services.tangram.people.config import SimulationConfig
 from tests.access.spy import Flow, SpyHub
+from tests.perception.eyes.faces import recorded
+from tests.perception.eyes.people import Pose
 from tests.perception.spoken import spoken, write_wav
 
 ROLES = {
@@ -60,6 +64,15 @@ async def listen(flows: set[Flow], folder: Path) -> None:
     path = write_wav(folder / "said.wav", spoken("yes").samples)
     config = Config(hearing=HearingConfig(source=str(path)))
     services = {name: roster.service(name, config) for name in ("recognition", "hearing")}
+    async with SpyHub(flows, ROLES) as hub, running(hub, services) as over:
+        await over.wait()
+
+
+async def look(flows: set[Flow], folder: Path) -> None:
+    """A service that sees somebody nod, as it was recorded."""
+    path = recorded(folder / "seen.mcap", lambda at: [Pose(pitch=9 * float(np.sin(11 * at)))], 2.0)
+    config = Config(eyes=EyesConfig(source=f"landmarks:{path}"))
+    services = {name: roster.service(name, config) for name in ("recognition", "eyes")}
     async with SpyHub(flows, ROLES) as hub, running(hub, services) as over:
         await over.wait()
 
@@ -121,6 +134,7 @@ def flows(tmp_path_factory: pytest.TempPathFactory) -> set[Flow]:
         await tangram(found, SimulationConfig(perception="raw"))
         await visit(found)
         await listen(found, tmp_path_factory.mktemp("heard"))
+        await look(found, tmp_path_factory.mktemp("seen"))
 
     with asyncio.Runner(loop_factory=virtual_loop) as runner:
         runner.run(everything())
@@ -129,7 +143,8 @@ def flows(tmp_path_factory: pytest.TempPathFactory) -> set[Flow]:
 
 def test_nothing_flows_that_the_table_denies(flows: set[Flow]) -> None:
     assert len(flows) > 100
-    assert {"publishes", "subscribes", "serves"} <= {flow.does for flow in flows if flow.name == "hearing"}
+    for name in ("hearing", "eyes"):
+        assert {"publishes", "subscribes", "serves"} <= {flow.does for flow in flows if flow.name == name}
     assert not sorted(flow for flow in flows if not any(is_granted(row, flow) for row in TABLE))
 
 

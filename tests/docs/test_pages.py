@@ -63,6 +63,8 @@ ELSEWHERE = {
     ("docs/reachy-mini.md", "sh"): "tests/control/reachy_mini/test_docs.py",
     ("docs/hearing.md", "sh"): "tests/perception/test_hearing_page.py",
     ("docs/hearing.md", "python"): "tests/perception/test_hearing_page.py",
+    ("docs/eyes.md", "sh"): "tests/perception/eyes/test_eyes_page.py",
+    ("docs/eyes.md", "python"): "tests/perception/eyes/test_eyes_page.py",
     ("docs/people.md", "python"): "tests/client/test_people_page.py",
     ("docs/talk.md", "python"): "tests/client/test_small_talk.py",
     ("docs/console.md", "nginx"): "tests/console/test_path.py",

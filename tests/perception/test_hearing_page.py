@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from engage_hri.services.commandline.shell.roster import SENSES, group
+from engage_hri.services.commandline.shell.roster import group
 from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.perception.hearing.microphone import RECORDERS
 from engage_hri.services.perception.hearing.recognizing import RecognizerSettings, SpeechWords, settings_of
@@ -25,7 +25,7 @@ def test_its_command_has_settings_that_there_are():
     [(_, command)] = [block.strip().splitlines() for block in shown("sh")]
     words = shlex.split(command)
     assert words[:2] == [".venv/bin/engage", "run"]
-    assert group(words[2]) == SENSES
+    assert group(words[2]) == ("hearing",)
 
     settings = [value for option, value in pairwise(words) if option == "--set"]
     config = read(RobotConfig, settings=settings).hearing

@@ -28,7 +28,7 @@ from engage_hri.services.commandline.look.window import can_open, seat_refusal, 
 from engage_hri.services.commandline.shell.options import Embodied, Hearing, Kiosk, Shown, Written
 from engage_hri.services.commandline.shell.outputs import LOG, Outputs, complain
 from engage_hri.services.commandline.shell.process import DONE, run_until_signal
-from engage_hri.services.commandline.shell.roster import ROBOT, SENSES, complete
+from engage_hri.services.commandline.shell.roster import ROBOT, complete
 from engage_hri.services.commandline.shell.settings import AT_PAGES, RobotConfig
 from engage_hri.services.console.follow import following
 from engage_hri.services.console.terminal.live import scene_view
@@ -150,7 +150,7 @@ async def _talk(
     """Run all services and the manager on a bus in memory."""
     began = asyncio.get_running_loop().time()
     tell = partial(console.print, highlight=False, markup=False, soft_wrap=True)
-    names = (*ROBOT, *(SENSES if has_hearing() else ()), "simulation")
+    names = (*ROBOT, *(("hearing",) if has_hearing() else ()), "simulation")
     async with MemoryHub(config.robot, decodes=False) as hub:
         bus, opens = hub.join("console"), can_open(console.is_terminal)
         page = partial(

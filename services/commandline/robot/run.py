@@ -40,6 +40,11 @@ class Options(Embodied, Hearing, Listening):
     ]
     attended: Annotated[bool, typer.Option("--attended", hidden=True)] = False
 
+    @property
+    def sense(self) -> str:
+        """Section of the service for which the source is."""
+        return "eyes" if "eyes" in roster.group(self.services) else "hearing"
+
 
 def ready_line(name: str) -> str:
     """Line that a service prints on standard error when it serves. `engage up` waits for it."""
@@ -51,8 +56,9 @@ def main(options: Options) -> int:
     names = roster.group(options.services)
     if (options.body or options.voice) and "control" not in names:
         raise InputRefused(Fault(reason="--body and --voice are for control", advice="engage run control --body ..."))
-    if options.source and "hearing" not in names:
-        raise InputRefused(Fault(reason="--from is for hearing", advice="engage run hearing --from FILE.wav"))
+    if options.source and len({*names} & {*SENSES}) != 1:
+        advice = "engage run hearing --from FILE.wav, or engage run eyes --from film:PATH"
+        raise InputRefused(Fault(reason="--from is for hearing or eyes, one of them", advice=advice))
     if options.attended:
         end_after_the_parent()
     on_robot = {*names} <= {*ROBOT, *SENSES}

@@ -22,7 +22,7 @@ from engage_hri.services.commandline.robot.run import ready_line
 from engage_hri.services.commandline.shell.options import Embodied, Hearing, Listening, Simulated, Written
 from engage_hri.services.commandline.shell.outputs import Outputs, complain
 from engage_hri.services.commandline.shell.process import DONE, run_until_signal
-from engage_hri.services.commandline.shell.roster import ROBOT, SENSES, TASK, Groups, complete, groups, widest
+from engage_hri.services.commandline.shell.roster import ROBOT, TASK, Groups, complete, groups, widest
 from engage_hri.services.commandline.shell.settings import ELSEWHERE, FROM_PAGES, TRANSCRIPT, RobotConfig
 from engage_hri.services.commandline.shell.supervisor import Child, supervised
 from engage_hri.services.console.follow import Sink, following
@@ -143,7 +143,7 @@ def _senses(options: Options, config: RobotConfig) -> tuple[str, ...]:
             raise InputRefused(fault)
         complain(str(fault))
         return ()
-    return SENSES
+    return ("hearing",)
 
 
 @asynccontextmanager

@@ -124,7 +124,7 @@ class Embodied(Configured):
 
 @dataclass(frozen=True, kw_only=True)
 class Hearing(Configured):
-    """Options for the robot's ears."""
+    """Options for the robot's ears, and eyes where they run."""
 
     source: Annotated[
         str | None,
@@ -132,7 +132,7 @@ class Hearing(Configured):
             "--from",
             metavar="SOURCE",
             help="What hearing hears: page, the microphones of the pages of windows; a program that records "
-            "(arecord); a WAV file.",
+            "(arecord); a WAV file. What eyes see: camera; film:PATH; landmarks:RECORDING.",
             show_default=False,
         ),
     ] = None
@@ -140,8 +140,13 @@ class Hearing(Configured):
     @property
     def overrides(self) -> tuple[str, ...]:
         """Settings of the options, which are stronger than `--set`."""
-        own = (f"hearing.source={json.encode(self.source).decode()}",) if self.source else ()
+        own = (f"{self.sense}.source={json.encode(self.source).decode()}",) if self.source else ()
         return (*super().overrides, *own)
+
+    @property
+    def sense(self) -> str:
+        """Section of the service for which the source is."""
+        return "hearing"
 
 
 @dataclass(frozen=True, kw_only=True)

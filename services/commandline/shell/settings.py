@@ -7,6 +7,7 @@ from engage_hri.schemas.world import COVERED_FOR
 from engage_hri.services.bus.config import BusConfig
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.perception.eyes.config import EyesConfig
 from engage_hri.services.perception.hearing.config import PAGE, HearingConfig
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.recognition.config import RecognitionConfig
@@ -37,6 +38,7 @@ class RobotConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     recognition: RecognitionConfig = RecognitionConfig()
     control: ControlConfig = ControlConfig()
     hearing: HearingConfig = HearingConfig()
+    eyes: EyesConfig = EyesConfig()
 
     def __post_init__(self) -> None:
         not_negative(self, ("covered_for",))

@@ -2,26 +2,28 @@
 
     python -m engage_hri.services.perception.hearing.listening
 
-is that process: orders in on standard input, answers out on standard output, each with four bytes of length before
-it, little-endian, and in MessagePack. It ends with its standard input. Recognizers take seconds, need much memory,
-and some crash: hearing goes on.
+is that process: orders in on standard input, answers out on standard output. It ends with its standard input.
+Recognizers take seconds, need much memory, and some crash: hearing goes on.
 """
 
 import asyncio
-import os
-import signal
 import sys
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
-from typing import Any, BinaryIO
 
 import msgspec
 
 from engage_hri.schemas.advice import suggestion
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.perception.hearing.child import PipedProcess
+from engage_hri.services.perception.child import (
+    PackedMessages,
+    PipedProcess,
+    answering,
+    next_message,
+    packed_message,
+)
 from engage_hri.services.perception.hearing.recognizing import (
     Answer,
     Desk,
@@ -32,8 +34,6 @@ from engage_hri.services.perception.hearing.recognizing import (
 )
 from engage_hri.services.runtime.installation import RECOGNIZERS, offers
 
-HEAD = 4
-"""Bytes of the length before each message."""
 MAKING: Seconds = 120.0
 """Time in which a recognizer has to be there: it may have a large model to load."""
 LIMIT: Seconds = 20.0
@@ -116,7 +116,7 @@ class InItsOwn(Understanding):
         self._order, self._on_answer = order, on_answer
         self._loop = asyncio.get_running_loop()
         self._child: PipedProcess | None = None
-        self._buffer = bytearray()
+        self._answers = PackedMessages(Made | Answer)
         self._made: asyncio.Future[None] = self._loop.create_future()
         self._open: dict[int, asyncio.TimerHandle | None] = {}
         """Speeches without a last answer, and from their ends on the time that is left."""
@@ -139,7 +139,7 @@ class InItsOwn(Understanding):
         if self._child is None:
             return
         self._open.setdefault(speech, None)
-        self._child.write(_packed(SpeechOrder(speech, samples)))
+        self._child.write(packed_message(SpeechOrder(speech, samples)))
         if not samples:
             self._open[speech] = self._loop.call_later(LIMIT, self._lose, f"does not answer for {LIMIT:g} s")
         elif self._child.unsent > MOST_UNREAD:
@@ -155,20 +155,14 @@ class InItsOwn(Understanding):
         self._open.clear()
 
     def _start(self) -> None:
-        self._buffer.clear()
+        self._answers = PackedMessages(Made | Answer)
         command = [sys.executable, "-m", "engage_hri.services.perception.hearing.listening"]
         self._child = PipedProcess(command, self._take, self._lose)
-        self._child.write(_packed(self._order))
+        self._child.write(packed_message(self._order))
 
     def _take(self, more: bytes) -> None:
-        self._buffer += more
-        while len(self._buffer) >= HEAD:
-            size = int.from_bytes(self._buffer[:HEAD], "little")
-            if len(self._buffer) < HEAD + size:
-                return
-            content = bytes(self._buffer[HEAD : HEAD + size])
-            del self._buffer[: HEAD + size]
-            self._answered(msgspec.msgpack.decode(content, type=Made | Answer))
+        for answer in self._answers.take(more):
+            self._answered(answer)
 
     def _answered(self, answer: Made | Answer) -> None:
         if isinstance(answer, Made):
@@ -183,7 +177,7 @@ class InItsOwn(Understanding):
                 timer.cancel()
             elif isinstance(answer, NotUnderstood) and self._child is not None:  # given up while it went on
                 self._failed.append(answer.speech)
-                self._child.write(_packed(SpeechOrder(answer.speech, b"")))
+                self._child.write(packed_message(SpeechOrder(answer.speech, b"")))
         self._on_answer(answer)
 
     def _lose(self, how: str, fault: Fault | None = None) -> None:
@@ -200,32 +194,10 @@ class InItsOwn(Understanding):
 # -- its process ---------------------------------------------------------------------------------------------------
 
 
-def _packed(message: msgspec.Struct) -> bytes:
-    content = msgspec.msgpack.encode(message)
-    return len(content).to_bytes(HEAD, "little") + content
-
-
-def _unpacked(file: BinaryIO, kind: Any) -> Any:
-    """The next message; None: there is none any more."""
-    head = file.read(HEAD)
-    content = file.read(int.from_bytes(head, "little")) if len(head) == HEAD else b""
-    return msgspec.msgpack.decode(content, type=kind) if content else None
-
-
 def main() -> None:
     """Serve until standard input ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the service that asks
-    out = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what an engine prints is no answer
-
-    def answer(message: msgspec.Struct) -> None:
-        try:
-            out.write(_packed(message))
-            out.flush()
-        except BrokenPipeError:  # whoever asks is gone
-            os._exit(0)
-
-    order = _unpacked(sys.stdin.buffer, Order)
+    answer = answering()
+    order = next_message(sys.stdin.buffer, Order)
     try:
         desk = Desk(found(order.name, order.settings))
     except Exception as error:
@@ -233,7 +205,7 @@ def main() -> None:
         answer(Made(error.fault if isinstance(error, EngageError) else Fault(reason=reason)))
         return
     answer(Made())
-    while (sound := _unpacked(sys.stdin.buffer, SpeechOrder)) is not None:
+    while (sound := next_message(sys.stdin.buffer, SpeechOrder)) is not None:
         for each in desk.take(sound):
             answer(each)
 

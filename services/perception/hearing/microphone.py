@@ -19,7 +19,7 @@ import numpy as np
 
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.perception.hearing.child import PipedProcess
+from engage_hri.services.perception.child import PipedProcess
 from engage_hri.services.perception.hearing.config import PAGE
 from engage_hri.services.perception.hearing.sound import Piece, SampleClock, read_wav
 from engage_hri.services.perception.hearing.voice import RATE, Samples

@@ -1,13 +1,23 @@
-"""A process with pipes, read and written on the loop: what may block, blocks there."""
+"""A process with pipes, read and written on the loop: what may block, blocks there.
+
+What it says and is told are messages: four bytes of length, little-endian, and MessagePack.
+"""
 
 import asyncio
 import os
+import signal
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from typing import Any, BinaryIO
+
+import msgspec
 
 from engage_hri.schemas.text import printable
+
+HEAD = 4
+"""Bytes of the length before each message."""
 
 WORDS = 2000
 """Bytes that are kept of the last that it has said on standard error."""
@@ -100,3 +110,53 @@ class PipedProcess:
             while more := os.read(self._errors, STEP):
                 self._said = (self._said + more)[-WORDS:]
             self._loop.remove_reader(self._errors)
+
+
+class PackedMessages:
+    """Messages that come in pieces. kind: type of all of them."""
+
+    def __init__(self, kind: Any) -> None:
+        self._kind, self._buffer = kind, bytearray()
+
+    def take(self, more: bytes) -> Iterator[Any]:
+        """Take the next bytes. Returns the messages that are whole now."""
+        self._buffer += more
+        while len(self._buffer) >= HEAD:
+            size = int.from_bytes(self._buffer[:HEAD], "little")
+            if len(self._buffer) < HEAD + size:
+                return
+            content = bytes(self._buffer[HEAD : HEAD + size])
+            del self._buffer[: HEAD + size]
+            yield msgspec.msgpack.decode(content, type=self._kind)
+
+
+def packed_message(message: msgspec.Struct) -> bytes:
+    """Pack a message for a pipe."""
+    content = msgspec.msgpack.encode(message)
+    return len(content).to_bytes(HEAD, "little") + content
+
+
+def next_message(file: BinaryIO, kind: Any) -> Any:
+    """Read the next message, in the process itself; None: there is none any more."""
+    head = file.read(HEAD)
+    content = file.read(int.from_bytes(head, "little")) if len(head) == HEAD else b""
+    return msgspec.msgpack.decode(content, type=kind) if content else None
+
+
+def answering() -> Callable[[msgspec.Struct], None]:
+    """Set the process itself up: Ctrl-C is for the service that asks, and what a library prints is no answer.
+
+    Returns what sends an answer; once nobody reads it, the process ends.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    out = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+
+    def answer(message: msgspec.Struct) -> None:
+        try:
+            out.write(packed_message(message))
+            out.flush()
+        except BrokenPipeError:
+            os._exit(0)
+
+    return answer

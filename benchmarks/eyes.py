@@ -1,0 +1,127 @@
+"""Eyes on rendered people of whom nothing was learned: faces found, errors of heads, processor time of a picture.
+
+python benchmarks/eyes.py [--pictures 24] [--json]     (of each of ten people; `make eyes` fetches what it needs)
+"""
+
+import argparse
+import json
+import time
+from collections.abc import Sequence
+from multiprocessing import Pool
+from typing import NamedTuple
+
+import numpy as np
+
+from engage_hri.schemas.landmarks import FaceLandmarks
+from engage_hri.schemas.units import Stamp
+from engage_hri.services.perception.eyes.config import EyesConfig
+from engage_hri.services.perception.eyes.head_pose import head, yaw_pitch
+from engage_hri.services.perception.eyes.looking import packed
+from engage_hri.services.perception.eyes.seeing import Seeing
+from engage_hri.services.perception.eyes.sources.litert import FaceFinder
+from tests.perception.eyes.cases import CHUNKS, cases
+from tests.perception.eyes.fetched import MODELS
+from tests.perception.eyes.people import CAMERA, JUDGED
+
+FIRST = 100
+"""Number of the first person who is judged, as a seed: those who are learned from have others."""
+TIMES = 20
+"""How often each picture is looked at, for its processor time."""
+
+
+class Measured(NamedTuple):
+    """A picture. yaw, pitch, beside: errors, degrees; None: no face was found. distance: share of the true one.
+
+    sure: errors of yaw and pitch as shares of the stated deviations. look, behind: processor milliseconds.
+    """
+
+    person: int
+    look: float
+    behind: float = 0.0
+    yaw: float | None = None
+    pitch: float | None = None
+    beside: float = 0.0
+    distance: float = 0.0
+    sure: tuple[float, float] = (0.0, 0.0)
+
+
+def measured(chunk: tuple[int, int, int]) -> list[Measured]:
+    person, number, count = chunk
+    found = []
+    for case in cases(JUDGED[person], FIRST + person, number, count):
+        finder = FaceFinder(MODELS, 4)
+        begin = time.process_time()
+        for _ in range(TIMES):
+            faces = finder.find(case.picture)
+        look = 1000 * (time.process_time() - begin) / TIMES
+        seen = head(faces[0][0], CAMERA.width, CAMERA.height, CAMERA.focal) if faces else None
+        if seen is None:
+            found.append(Measured(person, look))
+            continue
+        told = FaceLandmarks(at=Stamp("", 0), width=CAMERA.width, height=CAMERA.height, faces=(packed(faces[0][0]),))
+        seeing = Seeing(EyesConfig())
+        begin = time.process_time()
+        for k in range(TIMES):
+            seeing.feed(told, k / 15)
+        behind = 1000 * (time.process_time() - begin) / TIMES
+        wrong = np.array(yaw_pitch(seen.ahead)) - yaw_pitch(case.pose.ahead)
+        beside = np.arccos(np.clip(seen.ahead @ case.pose.ahead, -1, 1))
+        yaw, pitch = np.degrees(wrong).tolist()
+        found.append(
+            Measured(
+                person, look, behind, yaw, pitch, float(np.degrees(beside)),
+                float(seen.distance / np.linalg.norm(case.pose.at)),
+                (abs(wrong[0]) / seen.yaw_spread, abs(wrong[1]) / seen.pitch_spread),
+            )
+        )  # fmt: skip
+    return found
+
+
+def summary(rows: Sequence[Measured]) -> dict[str, float]:
+    seen = [row for row in rows if row.yaw is not None]
+    beside = np.array([row.beside for row in seen])
+    angles = np.array([(row.yaw, row.pitch) for row in seen], float)
+    people = np.array([row.person for row in seen])
+    biases = np.array([angles[people == person].mean(0) for person in sorted(set(people.tolist()))])
+    sure = np.array([row.sure for row in seen])
+    distance = np.array([row.distance for row in seen])
+    figures = {
+        "pictures": len(rows),
+        "faces found, %": 100 * len(seen) / len(rows),
+        "head beside the truth, degrees, mean": beside.mean(),
+        "... median": np.median(beside),
+        "... of nine in ten at most": np.percentile(beside, 90),
+        "yaw, bias": angles[:, 0].mean(),
+        "yaw, scatter": angles[:, 0].std(),
+        "yaw, largest bias of a person": biases[np.abs(biases[:, 0]).argmax(), 0],
+        "pitch, bias": angles[:, 1].mean(),
+        "pitch, scatter": angles[:, 1].std(),
+        "pitch, largest bias of a person": biases[np.abs(biases[:, 1]).argmax(), 1],
+        "yaw within the stated deviation, % (68 is right)": 100 * (sure[:, 0] < 1).mean(),
+        "pitch within the stated deviation, %": 100 * (sure[:, 1] < 1).mean(),
+        "distance, bias, %": 100 * (distance.mean() - 1),
+        "distance, scatter, %": 100 * distance.std(),
+        "processor of a picture, ms, median": np.median([row.look for row in rows]),
+        "... behind the landmarks": np.median([row.behind for row in seen]),
+    }
+    return {name: round(float(value), 2) for name, value in figures.items()}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--pictures", type=int, default=24)
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    chunks = [(who, part, options.pictures // CHUNKS) for who in range(len(JUDGED)) for part in range(CHUNKS)]
+    with Pool(2) as pool:
+        rows = [row for found in pool.map(measured, chunks, 1) for row in found]
+    figures = summary(rows)
+    if options.json:
+        print(json.dumps(figures))
+        return
+    for name, value in figures.items():
+        print(f"{name:52s} {value:8.2f}")
+
+
+if __name__ == "__main__":
+    main()

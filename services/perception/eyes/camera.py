@@ -1,0 +1,39 @@
+"""Camera of the eyes: from its axes to the robot's frame, and how wide it sees. Pure.
+
+Axes of a camera: x to the right of the picture, y down, z away from it; without distortion.
+"""
+
+from math import radians, tan
+
+import numpy as np
+
+from engage_hri.schemas.units import Degrees, Vector
+from engage_hri.services.perception.eyes.looking import Floats
+
+
+class StatedCamera:
+    """A camera where the settings say that it stands.
+
+    field_of_view: from the left edge to the right, degrees. place: in the robot's frame. tilt: up; pan: to the left.
+    """
+
+    def __init__(self, field_of_view: Degrees, place: Vector, tilt: Degrees, pan: Degrees) -> None:
+        self._half, self._place = tan(radians(field_of_view) / 2), np.array(place)
+        (cu, cl), (su, sl) = np.cos(np.radians([tilt, pan])), np.sin(np.radians([tilt, pan]))
+        ahead = np.array([cl * cu, sl * cu, su])
+        right = np.array([sl, -cl, 0.0])
+        self._axes = np.column_stack([right, np.cross(ahead, right), ahead])
+
+    def focal(self, width: int) -> float:
+        """Focal length for pictures of a width, in pixels."""
+        return width / 2 / self._half
+
+    def place(self, point: Floats) -> Vector:
+        """Place in the robot's frame of a point in camera axes."""
+        x, y, z = (self._place + self._axes @ point).tolist()
+        return (x, y, z)
+
+    def direction(self, direction: Floats) -> Vector:
+        """Direction in the robot's frame of one in camera axes."""
+        x, y, z = (self._axes @ direction).tolist()
+        return (x, y, z)

