@@ -27,6 +27,11 @@ SHELLS = {
     "services/control/contract/bell.py",  # waits for a moment or a change of authority
     "services/console/web/sessions.py",  # ends sessions whose page does not come back
     "services/perception/hearing/child.py",  # a process with pipes
+    "services/perception/hearing/company.py",  # publishes people and faults
+    "services/perception/hearing/device.py",  # waits for sound, and for a device that is gone
+    "services/perception/hearing/intake.py",  # takes what others tell
+    "services/perception/hearing/pages.py",  # takes the sound of pages
+    "services/perception/hearing/speeches.py",  # publishes voices and words, waits for the last ones
     "services/perception/hearing/listening.py",  # runs the process of a recognizer
     "services/perception/hearing/microphone.py",  # plays a file, or runs the program that records
     "services/recording/replay.py",  # says what was said
