@@ -29,6 +29,11 @@ SHELLS = {
     "services/perception/eyes/packages.py",  # runs pip
     "services/perception/eyes/watching.py",  # runs the process of a source
     "services/perception/eyes/sources/pictures.py",  # a camera, in that process
+    "services/perception/hearing/company.py",  # publishes people and faults
+    "services/perception/hearing/device.py",  # waits for sound, and for a device that is gone
+    "services/perception/hearing/intake.py",  # takes what others tell
+    "services/perception/hearing/pages.py",  # takes the sound of pages
+    "services/perception/hearing/speeches.py",  # publishes voices and words, waits for the last ones
     "services/perception/hearing/listening.py",  # runs the process of a recognizer
     "services/perception/hearing/microphone.py",  # plays a file, or runs the program that records
     "services/recording/replay.py",  # says what was said

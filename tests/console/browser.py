@@ -99,7 +99,7 @@ class Page:
 
     async def picture(self, *, whole: bool = True, scale: float = 1.0) -> bytes:
         """A PNG of the page as it is. whole: also what one has to scroll to. scale: below 1: smaller."""
-        more = {}
+        more: dict[str, Any] = {}
         if scale != 1.0:
             width, height = await self.value("[innerWidth, innerHeight]")
             more = {"clip": {"x": 0, "y": 0, "width": width, "height": height, "scale": scale}}

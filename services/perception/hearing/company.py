@@ -1,4 +1,4 @@
-"""Who is here, as far as hearing knows, and what it complains of."""
+"""People whom hearing knows, and faults that it tells."""
 
 from collections import deque
 

@@ -1,4 +1,4 @@
-"""What hearing takes from the bus besides sound: who is here, and the robot's own voice."""
+"""Messages that hearing takes besides sound: who is here, and the robot's own voice."""
 
 from collections.abc import Iterable
 

@@ -74,7 +74,7 @@ class SoundChannel:
 
 
 class Speeches:
-    """What is said in all channels. recognizer: None: nobody understands words."""
+    """Speeches of all channels. recognizer: None: nobody understands words."""
 
     def __init__(self, bus: Bus, config: HearingConfig, people: HeardPeople, faults: HearingFaults) -> None:
         """Raises InputRefused: there is no such recognizer, or a package is not installed."""

@@ -32,10 +32,10 @@ QUIETEST = 0.15
 """Share of the frames that are taken for noise alone."""
 OVER, LEAST = 1.5, 0.25
 """How much more noise than there is is taken out, and what remains at least: by trial, on phrases in pink noise."""
-BEAMS = {"beam": 1e-64, "pbeam": 1e-64, "wbeam": 1e-40}
+BEAMS = {"beam": 1e-72, "pbeam": 1e-72, "wbeam": 1e-44}
 """How much less likely than the best what is still looked into may be. With the usual 1e-48 and 7e-29 some of forty
 phrases are given up half-way."""
-FIT = -4.6
+FIT = -4.8
 """Fit of sound and phrase, a logarithm for each frame, below which it was something else: by trial, with these
 beams (docs/decisions/0175)."""
 
