@@ -197,7 +197,8 @@ class People:
             if taken_up.asked in self.persons:
                 self._apply(self.persons[taken_up.asked], at, partial(_answered_by_other, taken_up))
         while answered := self._writer.answered:
-            first = min(range(len(answered)), key=lambda n: answered[n][0].delay or 0.0)  # the end of a turn decides all
+            # The end of a turn decides several answers in one instant: the first is that of who was silent.
+            first = min(range(len(answered)), key=lambda n: answered[n][0].delay or 0.0)
             told = partial(_answered_for_all, *answered.pop(first))
             for person in list(self.persons.values()):  # who has left meanwhile was asked, too
                 self._apply(person, at, told)
