@@ -76,6 +76,20 @@ def test_the_first_answer_is_that_of_all(seed: int) -> None:
         assert (asked_one == by) == (life[-1].duration is not None)
 
 
+@pytest.mark.parametrize("seed", range(50))
+def test_of_several_answers_into_the_turn_the_first_is_that_of_who_is_silent(seed: int) -> None:
+    chance = random.Random(seed)
+    silent, *speak = chance.sample(PEOPLE, chance.randint(3, 4))
+    speeches = [(round(OVER - chance.uniform(0.1, 0.7), 3), OVER + 0.5, who) for who in speak]
+    people = tuple(chance.sample((silent, *speak), len(speak) + 1))
+    decided = {who: life[1] for who, life in lives(asked(people, sorted(speeches))).items()}
+
+    assert {who: decided[who].answered_by for who in speak} == {who: who for who in speak}
+    first, _, by = min(speeches)
+    assert decided[silent].answered_by == by
+    assert decided[silent].delay == pytest.approx(first - OVER)
+
+
 def test_who_is_announced_after_the_first_word_is_addressed_too() -> None:
     log = Log("ann", "bob", adjacency_pair_limit=LIMIT)
     for number, one in enumerate(("ann", "bob")):

@@ -269,6 +269,10 @@ somebody's early words answer for both who were asked, also if one of them speak
     robot: started 1, preempted 4 after 1 by cy
     ann: started 4.5, failed 9.1
 
+a cough of who looks at her takes the answer from no question, also in the robot's words
+    0 ann said 0; 1 robot asks ann 3; 3 bob looks ann; 3.2 bob speaks 0.3; 5 ann speaks 0.6; 5.9 ann said 5; 30 end
+    robot: started 1, succeeded 5 after 1, completed 5.6
+
 a typed line is for the robot
     1 ann looks bob; 2 ann types hello; 20 end
     ann: started 2, failed 6

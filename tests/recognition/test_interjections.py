@@ -149,3 +149,19 @@ def test_who_looks_at_a_neighbor_does_not_hold_the_robot(
 
     told = [each for each in log.effects if isinstance(each, Interjection)]
     assert [(each.reading, each.at.seconds) for each in told] == expected
+
+
+def test_words_beside_the_nod_that_answers_are_of_that_answer() -> None:
+    log = Log(adjacency_pair_limit=4.0)
+    log.begins(ROBOT, "speak", 1.0, behavior="block-1:speech-1")
+    log.requests_event("adjacency_pair", 1.0, turn="turn-1")
+    log.begins(HUMAN, "nod", 2.7)
+    log.begins(HUMAN, "speak", 2.8)
+    log.ends(ROBOT, "speak", 3.0, behavior="block-1:speech-1")
+    log.signals("ended", 3.0)
+    log.ends(HUMAN, "nod", 3.2)
+    log.ends(HUMAN, "speak", 4.0)
+    log.until(60.0)
+
+    told = [(each.since.seconds, each.reading) for each in log.effects if isinstance(each, Interjection)]
+    assert told == [(2.8, "open"), (2.8, "answer")]

@@ -205,6 +205,8 @@ class Listener:
         for speech in self.sign.speeches if self.sign is not None else ():
             if speech.since < part.since:
                 self._tell(speech, at)
+            elif speech is not part:  # it goes on beside the gesture that answers, and is of that answer
+                self._writer.interject(self._id, speech.since, reading, at)
         self.sign = None
         self._is_turn(part, reading, at)
 

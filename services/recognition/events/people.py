@@ -196,8 +196,10 @@ class People:
             taken_up = scene.taken_up.pop()
             if taken_up.asked in self.persons:
                 self._apply(self.persons[taken_up.asked], at, partial(_answered_by_other, taken_up))
-        while self._writer.answered:
-            told = partial(_answered_for_all, *self._writer.answered.pop())
+        while answered := self._writer.answered:
+            # The end of a turn decides several answers in one instant: the first is that of who was silent.
+            first = min(range(len(answered)), key=lambda n: answered[n][0].delay or 0.0)
+            told = partial(_answered_for_all, *answered.pop(first))
             for person in list(self.persons.values()):  # who has left meanwhile was asked, too
                 self._apply(person, at, told)
 

@@ -145,7 +145,7 @@ class Talk(KindRecognizer):
         speech.is_beside = is_into_words and not is_to_person
         is_into_turn = is_into_words and is_to_person if self._line else self._conversation.is_into_turn(at)
         is_line = self._scene.lines.get(self.id) == at
-        speech.may_be_noise = self._scene.is_worded and not (is_line or speech.is_beside or says_words(speech.words))
+        speech.may_be_noise = self._scene.is_worded and not (is_line or says_words(speech.words))
         speech.is_into_turn = is_into_turn
         self._find(speech, face if is_into_turn else "", at)
         self._may_interrupt(speech, face, at)
@@ -325,8 +325,10 @@ class Talk(KindRecognizer):
         return first if isinstance(first, OwnSpeech) and not self._is_known(first) else None
 
     def _may_be_noise(self, speech: OwnSpeech) -> bool:
-        """True if the first speech in line may be a cough. The conversation judges those into its turn."""
-        return speech.may_be_noise and not self._conversation.is_into_turn(speech.since)
+        """True if the first speech in line may be a cough. The conversation judges those into the robot's words."""
+        is_aside = speech.faces.most(speech.since) not in ("", self._scene.robot)
+        is_into_words = speech.is_beside or self._conversation.is_into_turn(speech.since)
+        return speech.may_be_noise and (is_aside or not is_into_words)
 
     def _is_known(self, speech: OwnSpeech) -> bool:
         """True if it is known to whom the first speech in line is, and that it is one."""
