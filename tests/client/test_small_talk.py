@@ -127,8 +127,23 @@ def test_each_phrase_has_its_own_answer_also_among_other_words(phrase: str) -> N
     assert answer(f"{phrase.capitalize()}!") == own
 
 
-def test_what_it_does_not_know_it_says() -> None:
-    assert answer("Do you like the sea?") == OTHERWISE
+async def test_what_it_does_not_know_it_says_and_names_another_example_each_time() -> None:
+    async with talking() as going, perceive("ann", hub=going.robot.hub) as ann:
+        await ann.look_at(ann.robot)
+        await asyncio.sleep(6)
+        for words in ("Do you like the sea?", "Do you like the wind?"):
+            await ann.say(words)
+            await asyncio.sleep(12)
+
+    before, after = OTHERWISE.split("{example}")
+    named = [turn.removeprefix(before).removesuffix(after) for turn in going.turns[2:]]
+    assert (len({*named}), {*named} - {*EXAMPLES}) == (2, set())
+
+
+def test_it_understands_what_most_answer_to_its_greeting() -> None:
+    assert {answer(words) for words in ("Fine, thanks! And you?", "I am good.", "Fine, thank you.")} == {
+        answer("I am fine.")
+    }
 
 
 async def test_the_manager_that_the_page_shows_asks_and_hears(capsys: pytest.CaptureFixture[str]) -> None:

@@ -289,6 +289,23 @@ async def test_a_kiosk_asks_who_does_nothing_and_begins_anew_for_the_next(place:
 
 
 @needs_browser
+async def test_what_a_visitor_has_said_is_read_out_to_them_and_not_to_the_next(place: Place) -> None:
+    read = "document.querySelector('.read').textContent"
+    async with opened(place) as page:
+        await sit(page)
+        await press(page, ".say input")
+        await page.call("Input.insertText", text="My name is Xaver.")
+        await press(page, ".send")
+        await page.until(f"{read}.includes('You: My name is Xaver.')")
+        await press(page, ".do:last-child")
+        await page.until(f"!{PERSON}")
+        assert await page.value(read) == ""
+        async with opened(place) as other:
+            await other.until("window.stage.state.talk.bubbles.some(({ words }) => words.includes('Xaver'))")
+            assert await other.value(read) == ""
+
+
+@needs_browser
 async def test_what_becomes_of_who_does_nothing_and_what_a_visitor_is_told_first(place: Place) -> None:
     idle = "import('./stage/visit.js').then(({ visit }) => [5, 13, 25, 46, 61].map((idle) => visit(idle, %s).do))"
     seen = "import('./stage/visit.js').then(({ moment }) => moment(%s, 'robot', 'ann')?.text ?? '')"

@@ -15,7 +15,7 @@ from engage_hri import EngageError, Entity, Robot, connect
 RULES = {
     # what somebody says, in any of these forms, and what the robot answers; a thing in brackets it shows
     ("hello robot", "hello", "good morning"): "Hello! How are you?",
-    ("i am fine", "very well thank you"): "I am glad to hear that.",
+    ("i am fine", "i am good", "fine thank you", "fine thanks", "very well thank you"): "I am glad to hear that.",
     ("i am tired", "not so good"): "I am sorry. Stay with me for a while.",
     ("how are you", "are you well"): "I am well, thank you.",
     ("what is your name", "who are you"): "I am a robot, and I have no name yet.",
@@ -40,7 +40,7 @@ EXAMPLES = (
     "where is the pink triangle", "make me laugh", "how old are you", "show me the red square",
     "what is on the table", "where is the white piece", "what is your name",
 )  # fmt: skip
-"""What somebody may say. The robot names three of them as {examples}, and the next three next time."""
+"""What somebody may say. The robot names one of them as {example}, three as {examples}, and others next time."""
 NEXT = cycle(EXAMPLES)
 PIECES = (
     "orange rectangle", "white piece", "blue square", "green square", "purple square", "red square",
@@ -50,7 +50,7 @@ PIECES = (
 
 The white one is a trapezoid: the dictionary of `sphinx` has no such word."""
 SEVERAL = "There are several of these. Say colour and shape, as in: where is the blue square."
-OTHERWISE = "I did not understand that. Say, for example: where is the blue square."
+OTHERWISE = "I did not understand that. Say, for example: {example}."
 SILENCE = (
     # seconds in which somebody has said nothing, and what the robot says then; the first one greets
     (1.0, "Hello! I am glad that you are here. How are you?"),
@@ -131,6 +131,8 @@ async def say(robot: Robot, person: str, text: str, turn_index: Literal[2, 3]) -
     if "{examples}" in text:
         *some, last = islice(NEXT, 3)
         text = text.format(examples=f"{', '.join(some)}, or: {last}")
+    if "{example}" in text:
+        text = text.format(example=next(NEXT))
     match = re.fullmatch(r"(.*?[.!]?)\s*([^.!?]*\?)?", text)
     told, asked = match.groups() if match else (text, None)
     try:

@@ -87,13 +87,14 @@ function tell() {
   if (shown && scene) shown.take(scene, person);
 }
 
-// A screen reader hears each turn once, when it is over.
+// A screen reader hears each turn once, when it is over, and none from before: the words of a visitor are not for the next.
 const read = new Set();
-function readOut() {
+function readOut(isBefore) {
   for (const turn of state.talk.bubbles) {
     const key = `${turn.actor} ${turn.since}`;
     if (turn.open || read.has(key)) continue;
     read.add(key);
+    if (isBefore) continue;
     const line = document.createElement("p");
     line.lang = robotSpeaks;
     line.textContent = `${turn.actor === state.person ? state.text.you : turn.actor === state.robot ? state.text.robot : turn.actor}: ${turn.words}`;
@@ -108,15 +109,17 @@ const link = follow({
   take(frame, isFirst) {
     const behind = clock() - frame.now;
     offset = offset === null || isFirst || behind < offset ? behind : offset + (behind - offset) * 0.002; // frames come late, never early
+    const isBefore = !state.talk;
     if (frame.sections?.scene) state.scene = frame.sections.scene;
     if (frame.sections?.talk) state.talk = frame.sections.talk;
     if (frame.you) {
       if (state.person && !frame.you.person && isFirst) note(state.text.gone);
+      if (state.person !== (frame.you.person ?? "")) at(".read").replaceChildren();
       state.person = frame.you.person ?? "";
       state.denied = frame.you.denied?.seat ?? "";
     }
     if (frame.told?.length) refuse(frame.told);
-    if (frame.sections?.talk) readOut();
+    if (frame.sections?.talk) readOut(isBefore);
     if (frame.sections || frame.you) tell();
     document.body.dataset.frames = Number(document.body.dataset.frames ?? 0) + 1;
   },
