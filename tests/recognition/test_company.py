@@ -46,6 +46,14 @@ who thinks looks at nobody, and answers who has asked
     1 robot asks ann 2 limit=20; 12 ann speaks 1; 30 end
     robot: started 1, succeeded 12 after 9, completed 13
 
+... also if somebody says a little to her within its question
+    0.5 robot asks ann 5; 4 bob looks ann; 4.8 bob speaks 0.3; 6.5 ann speaks 1; 30 end
+    robot: started 0.5, succeeded 6.5 after 1, completed 7.5
+
+... but who asks her and still speaks when the robot is silent is answered
+    0.5 bob looks ann; 1 bob speaks 6; 2 robot asks ann 3; 6.5 ann speaks 1; 30 end
+    robot: started 2, failed 9
+
 an answer to another is none
     1 robot asks ann 2; 2 ann looks bob; 3.6 ann speaks 1; 20 end
     robot: started 1, failed 7
