@@ -59,6 +59,8 @@ class Spoken(Struct, kw_only=True):
     until: Seconds | None = None
     is_noise: bool = False
     """True if no words have come of it."""
+    is_open: bool = False
+    """True as long as it is not decided what it is that somebody says into the robot's words."""
     is_noted: bool = False
     """True once it counts for what others say after it."""
 

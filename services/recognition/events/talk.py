@@ -185,7 +185,7 @@ class Talk(KindRecognizer):
         if action == "speak":
             self.speech = speech = self._own_speech(since, confidence, face)
             if not self._find(speech, face, at):
-                self._likely(speech, at)
+                self._address(speech, self._likely(speech, at), at)
             if not speech.is_to(self._scene.robot):
                 return
         self.take(at, lambda talk: talk.goes_on(action, since, confidence))
@@ -207,7 +207,7 @@ class Talk(KindRecognizer):
         """Take a sound for speech after all: its words have come late."""
         speech.words, speech.told, speech.is_noise, speech.to = words, told or speech.told, False, None
         if not self._find(speech, "", at):
-            self._likely(speech, at)
+            self._address(speech, self._likely(speech, at), at)
         waits = any(each is speech for _, each in self._line)
         if speech.is_to(self._scene.robot) and speech.until is not None and not waits:
             since, until, confidence = speech.since, speech.until, speech.confidence
@@ -363,25 +363,27 @@ class Talk(KindRecognizer):
 
     def _decide(self, speech: OwnSpeech, at: Seconds) -> None:
         """Decide what the sound is, by what is known: nothing, if it is over and has no words; else to whom it is."""
-        if self._may_be_noise(speech) and speech.until is not None:
-            speech.may_be_noise, speech.is_noise, speech.to = False, True, NOBODY
+        to = self._likely(speech, at) if speech.to is None else speech.to
+        # The conversation judges what is for the robot, and said into its words.
+        is_judged_here = self._may_be_noise(speech) or self._scene.robot not in to
+        is_noise = is_judged_here and speech.may_be_noise and speech.until is not None
+        speech.may_be_noise = False
+        if is_noise:
+            speech.is_noise, speech.to = True, NOBODY
             self._noises[speech.since] = speech
             self._writer.decide_interjection(self.id, speech.since, "noise", at)
-            return
-        speech.may_be_noise = False
-        if speech.to is None:
-            self._likely(speech, at)
+        elif speech.to is None:
+            self._address(speech, to, at)
 
-    def _likely(self, speech: OwnSpeech, at: Seconds) -> None:
-        """Decide to whom a speech is by what is likely."""
+    def _likely(self, speech: OwnSpeech, at: Seconds) -> Addressees:
+        """Addressees of a speech by what is likely."""
         if speech.until is None:
             speech.faces.turns(speech.faces.face, at)
         waits = self._conversation.exchange.pair.may_be_answered_with("speak")
         awaited_by = frozenset((self._scene.robot,)) if waits else NOBODY
         is_untold = self._scene.tells_addressees and not says_words(speech.words)
         within = self._config.adjacency_pair_limit
-        to = likely(speech, self._scene.spoken, within=within, awaited_by=awaited_by, is_untold=is_untold)
-        self._address(speech, to, at)
+        return likely(speech, self._scene.spoken, within=within, awaited_by=awaited_by, is_untold=is_untold)
 
     def may_go_on(self, now: Seconds) -> bool:
         """True if it is decided by `now` to whom the first speech in line is, or if what is decided may be told."""
