@@ -153,6 +153,42 @@ of two who begin at once who was asked answers, and the other has a turn of thei
     robot: started 1, succeeded 3.6 after 0.6, completed 4.6
     ann: started 3.6, failed 8.6
 
+the first words of all call the robot, although nobody knew that words would come
+    1 ann speaks 1; 2.3 ann said 1 words=robot,help,me; 20 end
+    ann: started 1, failed 6
+
+... or perception tells with them that they are for it
+    1 ann speaks 1; 2.3 ann said 1 to=robot; 20 end
+    ann: started 1, failed 6
+
+... or tells that without words
+    1 ann speaks 1; 2.3 ann said 1 words= to=robot; 20 end
+    ann: started 1, failed 6
+
+... also if she looks at somebody else
+    1 ann looks bob; 1.5 ann speaks 1; 2.8 ann said 1.5 words=robot,help,me; 20 end
+    ann: started 1.5, failed 6.5
+
+... and they answer what it has asked
+    1 robot asks ann 2; 2 ann looks bob; 3.6 ann speaks 1; 4.9 ann said 3.6 words=robot,the,red; 20 end
+    robot: started 1, succeeded 3.6 after 0.6, completed 4.6
+
+... but first words that call nobody are for whom she looks at
+    1 ann looks bob; 1.5 ann speaks 1; 2.8 ann said 1.5 words=help,me; 20 end
+    nothing
+
+the words of a long speech call the robot when it is over
+    0 bob said 0; 1 ann looks bob; 1.5 ann speaks 5; 6.8 ann said 1.5 words=robot,help,me; 20 end
+    ann: started 1.5, failed 10.5
+
+... or while it goes on
+    0 bob said 0; 1 ann looks bob; 1.5 ann speaks 5; 5 ann said 1.5 words=robot,help,me; 20 end
+    ann: started 1.5, failed 10.5
+
+... as soon as so much of them is known
+    0 bob said 0; 1 ann looks bob; 1.5 ann speaks 5; 5 ann said 1.5; 6.8 ann said 1.5 words=robot,help; 20 end
+    ann: started 1.5, failed 10.5
+
 a laugh after a question is no answer
     0 ann said 0; 1 robot asks ann 2; 2 ann looks robot; 3.5 ann speaks 0.8; 20 end
     robot: started 1, failed 7

@@ -94,3 +94,17 @@ def test_where_nobody_tells_words_a_sound_in_the_robots_words_is_told() -> None:
     said = [looks("ann", ROBOT, 0.5), robot_asks("ann", 1.0, 8.0), says("ann", 3.0, 0.3)]
 
     assert told(played(*said, until=3.4)) == [("ann", (ROBOT,))]
+
+
+@pytest.mark.parametrize("face", ["bob", ""])
+def test_the_first_words_of_all_are_told_to_be_for_whom_they_call(face: str) -> None:
+    said = [looks("ann", face, 0.5) if face else [], says("ann", 1.0, 1.0), words("ann", 1.0, "robot, help me", 2.3)]
+
+    assert told(played(*said, until=2.2)) == ([("ann", ("bob",))] if face else [])
+    assert told(played(*said, until=2.4)) == [("ann", (ROBOT,))]
+
+
+def test_words_that_come_late_and_call_nobody_change_nothing() -> None:
+    said = [looks("ann", "bob", 0.5), says("ann", 1.0, 1.0), words("ann", 1.0, "help me", 2.3)]
+
+    assert told(played(*said, until=20.0)) == [("ann", ("bob",))]
