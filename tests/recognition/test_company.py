@@ -189,6 +189,23 @@ the words of a long speech call the robot when it is over
     0 bob said 0; 1 ann looks bob; 1.5 ann speaks 5; 5 ann said 1.5; 6.8 ann said 1.5 words=robot,help; 20 end
     ann: started 1.5, failed 10.5
 
+what she says to another into the question is no answer, if perception says so, although she looks at the robot
+    0 ann said 0; 1 robot asks ann 5; 2 ann looks robot; 3 ann speaks 0.6; 3.9 ann said 3 to=bob; 20 end
+    robot: started 1, failed 10
+
+... or her words do
+    0 ann said 0; 1 robot asks ann 5; 2 ann looks robot; 3 ann speaks 0.6; 3.9 ann said 3 words=bob,the,red; 20 end
+    robot: started 1, failed 10
+
+... also while she says them
+    0 ann said 0; 1 robot asks ann 5; 2 ann looks robot; 3 ann speaks 2; 3.9 ann said 3 words=bob,the,red; 20 end
+    robot: started 1, failed 10
+
+... and she answers afterwards
+    0 ann said 0; 1 robot asks ann 5; 2 ann looks robot; 3 ann speaks 2; 3.9 ann said 3 to=bob; 7 ann speaks 1
+    8 ann said 7; 20 end
+    robot: started 1, succeeded 7 after 1, completed 8
+
 a laugh after a question is no answer
     0 ann said 0; 1 robot asks ann 2; 2 ann looks robot; 3.5 ann speaks 0.8; 20 end
     robot: started 1, failed 7

@@ -100,6 +100,15 @@ class Listener:
                 part.until = at
             self.judge(at)
 
+    def forget(self, since: Seconds, at: Seconds) -> None:
+        """Forget a speech of the sign, as that was for others."""
+        self._speeches.pop(since, None)
+        if self.sign is not None:
+            self.sign.parts = [part for part in self.sign.parts if part.action != "speak" or part.since != since]
+            self.sign = self.sign if self.sign.parts else None
+            self._scene.read(self._id, since, "other")
+            self.judge(at)
+
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         sign, self.sign = self.sign, None
         if sign is not None and not sign.speeches:

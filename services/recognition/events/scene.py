@@ -245,12 +245,15 @@ class SessionScene:
             spoken.is_noted = True
             self.spoken.append(spoken)
 
+    def spoken_since(self, actor: str, since: Seconds) -> Spoken | None:
+        """The speech that began then; None: it is not known to whom it was, or long ago."""
+        return next((each for each in self.spoken if each.actor == actor and each.since == since), None)
+
     def read(self, actor: str, since: Seconds, reading: InterjectionReading) -> None:
         """Take what a speech into the robot's words is."""
-        for spoken in self.spoken:
-            if spoken.actor == actor and spoken.since == since:
-                spoken.is_open, spoken.is_noise = reading == "open", reading == "noise"
-                self.floor_changes += 1
+        if (spoken := self.spoken_since(actor, since)) is not None:
+            spoken.is_open, spoken.is_noise = reading == "open", reading == "noise"
+            self.floor_changes += 1
 
     def ended(self) -> list[Spoken]:
         """The speeches that were over last, in the order of their ends: of those known to be some, and to whom."""

@@ -200,8 +200,19 @@ class Talk(KindRecognizer):
                     self._find(speech, "", at)
         if (known := self._wordless.get(since)) is not None and (says_words(words) or told):
             self._has_words(known, words, told, at)
+        self.take(at, lambda talk: self._open_is_for(talk, since, words, told, at))
         self.take(at, lambda talk: talk.understand(since, at))
         self.go_on(at)
+
+    def _open_is_for(
+        self, talk: Conversation, since: Seconds, words: str, told: Addressees | None, at: Seconds
+    ) -> None:
+        """Take for whom a speech is that the face alone has told to be for the robot, as long as it is a sign."""
+        speech = self._scene.spoken_since(self.id, since)
+        if isinstance(speech, OwnSpeech) and speech.is_open:
+            speech.words, speech.told = words or speech.words, told or speech.told
+            if self._find(speech, "", at) and not speech.is_to(self._scene.robot):
+                talk.is_for_others(since, at)
 
     def _has_words(self, speech: OwnSpeech, words: str, told: Addressees | None, at: Seconds) -> None:
         """Take words that come late: the sound was speech after all, or is for others than it seemed."""
