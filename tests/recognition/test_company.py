@@ -46,6 +46,14 @@ who thinks looks at nobody, and answers who has asked
     1 robot asks ann 2 limit=20; 12 ann speaks 1; 30 end
     robot: started 1, succeeded 12 after 9, completed 13
 
+... also if somebody says a little to her within its question
+    0.5 robot asks ann 5; 4 bob looks ann; 4.8 bob speaks 0.3; 6.5 ann speaks 1; 30 end
+    robot: started 0.5, succeeded 6.5 after 1, completed 7.5
+
+... but who asks her and still speaks when the robot is silent is answered
+    0.5 bob looks ann; 1 bob speaks 6; 2 robot asks ann 3; 6.5 ann speaks 1; 30 end
+    robot: started 2, failed 9
+
 an answer to another is none
     1 robot asks ann 2; 2 ann looks bob; 3.6 ann speaks 1; 20 end
     robot: started 1, failed 7
@@ -144,6 +152,59 @@ of two who begin at once who was asked answers, and the other has a turn of thei
     1 robot asks bob 2; 3.5 ann looks robot; 3.6 ann speaks 1; 3.6 bob speaks 1; 3.7 bob looks robot; 20 end
     robot: started 1, succeeded 3.6 after 0.6, completed 4.6
     ann: started 3.6, failed 8.6
+
+the first words of all call the robot, although nobody knew that words would come
+    1 ann speaks 1; 2.3 ann said 1 words=robot,help,me; 20 end
+    ann: started 1, failed 6
+
+... or perception tells with them that they are for it
+    1 ann speaks 1; 2.3 ann said 1 to=robot; 20 end
+    ann: started 1, failed 6
+
+... or tells that without words
+    1 ann speaks 1; 2.3 ann said 1 words= to=robot; 20 end
+    ann: started 1, failed 6
+
+... also if she looks at somebody else
+    1 ann looks bob; 1.5 ann speaks 1; 2.8 ann said 1.5 words=robot,help,me; 20 end
+    ann: started 1.5, failed 6.5
+
+... and they answer what it has asked
+    1 robot asks ann 2; 2 ann looks bob; 3.6 ann speaks 1; 4.9 ann said 3.6 words=robot,the,red; 20 end
+    robot: started 1, succeeded 3.6 after 0.6, completed 4.6
+
+... but first words that call nobody are for whom she looks at
+    1 ann looks bob; 1.5 ann speaks 1; 2.8 ann said 1.5 words=help,me; 20 end
+    nothing
+
+the words of a long speech call the robot when it is over
+    0 bob said 0; 1 ann looks bob; 1.5 ann speaks 5; 6.8 ann said 1.5 words=robot,help,me; 20 end
+    ann: started 1.5, failed 10.5
+
+... or while it goes on
+    0 bob said 0; 1 ann looks bob; 1.5 ann speaks 5; 5 ann said 1.5 words=robot,help,me; 20 end
+    ann: started 1.5, failed 10.5
+
+... as soon as so much of them is known
+    0 bob said 0; 1 ann looks bob; 1.5 ann speaks 5; 5 ann said 1.5; 6.8 ann said 1.5 words=robot,help; 20 end
+    ann: started 1.5, failed 10.5
+
+what she says to another into the question is no answer, if perception says so, although she looks at the robot
+    0 ann said 0; 1 robot asks ann 5; 2 ann looks robot; 3 ann speaks 0.6; 3.9 ann said 3 to=bob; 20 end
+    robot: started 1, failed 10
+
+... or her words do
+    0 ann said 0; 1 robot asks ann 5; 2 ann looks robot; 3 ann speaks 0.6; 3.9 ann said 3 words=bob,the,red; 20 end
+    robot: started 1, failed 10
+
+... also while she says them
+    0 ann said 0; 1 robot asks ann 5; 2 ann looks robot; 3 ann speaks 2; 3.9 ann said 3 words=bob,the,red; 20 end
+    robot: started 1, failed 10
+
+... and she answers afterwards
+    0 ann said 0; 1 robot asks ann 5; 2 ann looks robot; 3 ann speaks 2; 3.9 ann said 3 to=bob; 7 ann speaks 1
+    8 ann said 7; 20 end
+    robot: started 1, succeeded 7 after 1, completed 8
 
 a laugh after a question is no answer
     0 ann said 0; 1 robot asks ann 2; 2 ann looks robot; 3.5 ann speaks 0.8; 20 end

@@ -151,6 +151,29 @@ def test_who_looks_at_a_neighbor_does_not_hold_the_robot(
     assert [(each.reading, each.at.seconds) for each in told] == expected
 
 
+@pytest.mark.parametrize("lasts", [0.6, 2.0])
+@pytest.mark.parametrize(("words", "to"), [("so", "bob"), ("bob, what about the red one", "")])
+def test_who_looks_at_the_robot_and_says_something_to_a_neighbor_holds_it_until_that_is_known(
+    words: str, to: str, lasts: float
+) -> None:
+    log = Log("ann", "bob", adjacency_pair_limit=4.0)
+    log.feed(Worded(actor="ann", since=0.0, text="good morning"), 0.1)
+    log.looks("ann", ROBOT, 0.5)
+    log.begins(ROBOT, "speak", 1.0, behavior="block-1:speech-1")
+    log.requests_event("adjacency_pair", 1.0, turn="turn-1", responder="ann")
+    said = Worded(actor="ann", since=3.0, text=words, to=frozenset((to,)) if to else None)
+    steps = [(3.9, lambda: log.feed(said, 3.9)), (3.0 + lasts, lambda: log.ends("ann", "speak", 3.0 + lasts))]
+    log.begins("ann", "speak", 3.0)
+    for at, step in sorted(steps, key=lambda each: each[0]):
+        log.until(at)
+        step()
+    log.until(20.0)
+
+    told = [each for each in log.effects if isinstance(each, Interjection)]
+    assert list(dict.fromkeys((each.reading, each.at.seconds) for each in told)) == [("open", 3.0), ("other", 3.9)]
+    assert [each.named for each in log.session.scene.ended() if each.actor == "ann"] == [{"bob"}]
+
+
 def test_words_beside_the_nod_that_answers_are_of_that_answer() -> None:
     log = Log(adjacency_pair_limit=4.0)
     log.begins(ROBOT, "speak", 1.0, behavior="block-1:speech-1")

@@ -11,8 +11,8 @@ stand in one order, from what is certain to what is likely:
 4. the gaze: whose face the speaker looks at for most of the speech. In groups of four, whom a speaker looks at is in
    77 of 100 looks the addressee (Vertegaal and others, CHI 2001). People also look away while they think, so that no
    look at a face says nothing;
-5. an answer goes to who has just spoken to the speaker, unless the speaker has answered since; and to the robot as
-   long as it waits for the speaker's answer;
+5. an answer goes to who spoke to the speaker last, unless the speaker has said something since; and to the robot as
+   long as it waits for the speaker's answer. Who spoke last is who stopped last: "mhm" within a question is none;
 6. more words go to those to whom the words before went, unless perception will say with the words to whom they are.
 
 If none of them finds anybody, it is not known, and nothing follows from it. The gaze is known when the speech is
@@ -59,6 +59,8 @@ class Spoken(Struct, kw_only=True):
     until: Seconds | None = None
     is_noise: bool = False
     """True if no words have come of it."""
+    is_open: bool = False
+    """True as long as it is not decided what it is that somebody says into the robot's words."""
     is_noted: bool = False
     """True once it counts for what others say after it."""
 
@@ -166,13 +168,10 @@ def likely(
     # Those that it comes during, or at most `within` after: few of all.
     recent = [each for each in spoken if each.since < at and (each.until is None or at <= each.until + within)]
     heard = [each for each in recent if (each.actor == actor or each.is_to(actor)) and not each.is_noise]
-    last = max(heard, key=_since, default=None)
+    # Who still goes on is the last, however that may end.
+    last = max(heard, key=lambda each: (at if each.until is None else min(each.until, at), each.since), default=None)
     if last is None:
         return awaited_by
     if last.actor != speech.actor:
         return frozenset((last.actor,))
     return NOBODY if is_untold or last.to is None else last.to
-
-
-def _since(spoken: Spoken) -> Seconds:
-    return spoken.since

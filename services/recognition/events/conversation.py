@@ -134,6 +134,12 @@ class Conversation:
                 self.pair.robot_begins("speak", self.robot_speaks_since)  # what the robot says now is the answer
         self._turned_at = at
 
+    def is_for_others(self, since: Seconds, at: Seconds) -> None:
+        """Forget speech into the robot's turn: it is known now, at `at`, that it is for others."""
+        if self._speech is not None and self._speech.since == since:
+            self._speech = None
+        self.listener.forget(since, at)
+
     def has_said(self, since: Seconds, until: Seconds, confidence: Probability) -> None:
         """Take speech that is over, known only now. It says nothing any more if either has spoken since."""
         if self._is_last(since):

@@ -77,6 +77,8 @@ class Listener:
             self.sign = ListenerSign([], is_beside=beside)
         self.sign.parts.append(part)
         self.sign.is_wordless = False  # this one's words may come
+        if part.action == "speak":
+            self._scene.read(self._id, part.since, "open")
 
     @property
     def is_beside(self) -> bool:
@@ -96,6 +98,15 @@ class Listener:
         if self.sign is not None:
             for part in self.sign.going_on(action):
                 part.until = at
+            self.judge(at)
+
+    def forget(self, since: Seconds, at: Seconds) -> None:
+        """Forget a speech of the sign, as that was for others."""
+        self._speeches.pop(since, None)
+        if self.sign is not None:
+            self.sign.parts = [part for part in self.sign.parts if part.action != "speak" or part.since != since]
+            self.sign = self.sign if self.sign.parts else None
+            self._scene.read(self._id, since, "other")
             self.judge(at)
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
@@ -206,20 +217,25 @@ class Listener:
             if speech.since < part.since:
                 self._tell(speech, at)
             elif speech is not part:  # it goes on beside the gesture that answers, and is of that answer
-                self._writer.interject(self._id, speech.since, reading, at)
+                self._read(speech.since, reading, at)
         self.sign = None
         self._is_turn(part, reading, at)
 
     def _is_turn(self, part: SignPart, reading: InterjectionReading, at: Seconds) -> None:
         if part.action == "speak":
-            self._writer.interject(self._id, part.since, reading, at)
+            self._read(part.since, reading, at)
         part.taken_for = "turn"
         self._exchange.take(part)
 
     def _tell(self, speech: SignPart, at: Seconds) -> None:
         """Tell that a speech was a listener's, or noise where its words would have come."""
         reading: InterjectionReading = "noise" if self._is_noise(speech) else "backchannel"
-        self._writer.interject(self._id, speech.since, reading, at)
+        self._read(speech.since, reading, at)
+
+    def _read(self, since: Seconds, reading: InterjectionReading, at: Seconds) -> None:
+        """Tell what a speech is, and remember it for what others say after it."""
+        self._scene.read(self._id, since, reading)
+        self._writer.interject(self._id, since, reading, at)
 
     # -- its words ----------------------------------------------------------------------------------------------
 

@@ -8,6 +8,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.fragments import Claim
+from engage_hri.schemas.recognition import InterjectionReading
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import GazeResolution
@@ -244,9 +245,20 @@ class SessionScene:
             spoken.is_noted = True
             self.spoken.append(spoken)
 
+    def spoken_since(self, actor: str, since: Seconds) -> Spoken | None:
+        """The speech that began then; None: it is not known to whom it was, or long ago."""
+        return next((each for each in self.spoken if each.actor == actor and each.since == since), None)
+
+    def read(self, actor: str, since: Seconds, reading: InterjectionReading) -> None:
+        """Take what a speech into the robot's words is."""
+        if (spoken := self.spoken_since(actor, since)) is not None:
+            spoken.is_open, spoken.is_noise = reading == "open", reading == "noise"
+            self.floor_changes += 1
+
     def ended(self) -> list[Spoken]:
-        """The speeches that were over last of those with known addressees, in the order of their ends."""
-        over = [(each.until, each.since, each) for each in self.spoken if each.until is not None and each.named]
+        """The speeches that were over last, in the order of their ends: of those known to be some, and to whom."""
+        known = [each for each in self.spoken if each.named and not (each.is_open or each.is_noise)]
+        over = [(each.until, each.since, each) for each in known if each.until is not None]
         return [each for _, _, each in sorted(over, key=lambda one: one[:2])[-ENDED_TOLD:]]
 
     @property

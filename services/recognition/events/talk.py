@@ -33,8 +33,8 @@ from engage_hri.services.recognition.events.machine import EventWriter, OngoingE
 from engage_hri.services.recognition.events.scene import Question, SessionScene
 from engage_hri.services.text.listening import says_words
 
-NOISES_KEPT = 8
-"""Number of sounds of which words may still tell that they were speech."""
+WORDLESS_KEPT = 8
+"""Number of sounds of which words may still tell that they were speech, or for whom."""
 Step = Callable[[Conversation], object]
 
 
@@ -50,8 +50,8 @@ class Talk(KindRecognizer):
         """Start of the first turn of the robot that is in line; infinite: none is."""
         self.speech: OwnSpeech | None = None
         """The speech of the person that goes on."""
-        self._noises: Latest[Seconds, OwnSpeech] = Latest(NOISES_KEPT)
-        """The latest sounds of which no words have come, by their starts."""
+        self._wordless: Latest[Seconds, OwnSpeech] = Latest(WORDLESS_KEPT)
+        """The latest sounds that were decided without words, and told to nobody, by their starts."""
 
     @property
     def is_in_contact(self) -> bool:
@@ -185,7 +185,7 @@ class Talk(KindRecognizer):
         if action == "speak":
             self.speech = speech = self._own_speech(since, confidence, face)
             if not self._find(speech, face, at):
-                self._likely(speech, at)
+                self._address(speech, self._likely(speech, at), at)
             if not speech.is_to(self._scene.robot):
                 return
         self.take(at, lambda talk: talk.goes_on(action, since, confidence))
@@ -198,19 +198,39 @@ class Talk(KindRecognizer):
                 speech.may_be_noise &= not says_words(speech.words)
                 if speech.to is None:
                     self._find(speech, "", at)
-        if since in self._noises and says_words(words):
-            self._was_speech(self._noises.pop(since), words, told, at)
+        if (known := self._wordless.get(since)) is not None and (says_words(words) or told):
+            self._has_words(known, words, told, at)
+        self.take(at, lambda talk: self._open_is_for(talk, since, words, told, at))
         self.take(at, lambda talk: talk.understand(since, at))
         self.go_on(at)
 
-    def _was_speech(self, speech: OwnSpeech, words: str, told: Addressees | None, at: Seconds) -> None:
-        """Take a sound for speech after all: its words have come late."""
-        speech.words, speech.told, speech.is_noise, speech.to = words, told or speech.told, False, None
-        if not self._find(speech, "", at):
-            self._likely(speech, at)
-        waits = any(each is speech for _, each in self._line)
-        if speech.is_to(self._scene.robot) and speech.until is not None and not waits:
-            since, until, confidence = speech.since, speech.until, speech.confidence
+    def _open_is_for(
+        self, talk: Conversation, since: Seconds, words: str, told: Addressees | None, at: Seconds
+    ) -> None:
+        """Take for whom a speech is that the face alone has told to be for the robot, as long as it is a sign."""
+        speech = self._scene.spoken_since(self.id, since)
+        if isinstance(speech, OwnSpeech) and speech.is_open:
+            speech.words, speech.told = words or speech.words, told or speech.told
+            if self._find(speech, "", at) and not speech.is_to(self._scene.robot):
+                talk.is_for_others(since, at)
+
+    def _has_words(self, speech: OwnSpeech, words: str, told: Addressees | None, at: Seconds) -> None:
+        """Take words that come late: the sound was speech after all, or is for others than it seemed."""
+        speech.words, speech.told = words or speech.words, told or speech.told
+        if speech.is_noise and not says_words(speech.words):
+            return
+        if not self._find(speech, "", at) and speech.is_noise:
+            self._address(speech, self._likely(speech, at), at)
+        speech.is_noise = False
+        if not speech.is_to(self._scene.robot):
+            return  # more of the words may still call it
+        del self._wordless[speech.since]
+        since, until, confidence = speech.since, speech.until, speech.confidence
+        if any(each is speech for _, each in self._line):
+            return
+        if until is None:
+            self.take_early(since, lambda talk: talk.speaks(since, confidence, beside=speech.is_beside))
+        else:
             self.take_early(since, lambda talk: talk.has_said(since, until, confidence))
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
@@ -218,7 +238,7 @@ class Talk(KindRecognizer):
         if self.speech is not None and self.speech.until is None:
             self.speech.until = until
         self.speech = None
-        self._noises.clear()
+        self._wordless.clear()
         for speech in self._undecided:
             self._decide(speech, at)
         self.go_on(at)
@@ -363,25 +383,28 @@ class Talk(KindRecognizer):
 
     def _decide(self, speech: OwnSpeech, at: Seconds) -> None:
         """Decide what the sound is, by what is known: nothing, if it is over and has no words; else to whom it is."""
-        if self._may_be_noise(speech) and speech.until is not None:
-            speech.may_be_noise, speech.is_noise, speech.to = False, True, NOBODY
-            self._noises[speech.since] = speech
-            self._writer.decide_interjection(self.id, speech.since, "noise", at)
-            return
+        to = self._likely(speech, at) if speech.to is None else speech.to
+        # The conversation judges what is for the robot, and said into its words.
+        is_judged_here = self._may_be_noise(speech) or self._scene.robot not in to
+        is_noise = is_judged_here and speech.may_be_noise and speech.until is not None
         speech.may_be_noise = False
-        if speech.to is None:
-            self._likely(speech, at)
+        if is_noise:
+            speech.is_noise, speech.to = True, NOBODY
+            self._writer.decide_interjection(self.id, speech.since, "noise", at)
+        elif speech.to is None:
+            self._address(speech, to, at)
+        if not (says_words(speech.words) or speech.is_to(self._scene.robot)):
+            self._wordless[speech.since] = speech
 
-    def _likely(self, speech: OwnSpeech, at: Seconds) -> None:
-        """Decide to whom a speech is by what is likely."""
+    def _likely(self, speech: OwnSpeech, at: Seconds) -> Addressees:
+        """Addressees of a speech by what is likely."""
         if speech.until is None:
             speech.faces.turns(speech.faces.face, at)
         waits = self._conversation.exchange.pair.may_be_answered_with("speak")
         awaited_by = frozenset((self._scene.robot,)) if waits else NOBODY
         is_untold = self._scene.tells_addressees and not says_words(speech.words)
         within = self._config.adjacency_pair_limit
-        to = likely(speech, self._scene.spoken, within=within, awaited_by=awaited_by, is_untold=is_untold)
-        self._address(speech, to, at)
+        return likely(speech, self._scene.spoken, within=within, awaited_by=awaited_by, is_untold=is_untold)
 
     def may_go_on(self, now: Seconds) -> bool:
         """True if it is decided by `now` to whom the first speech in line is, or if what is decided may be told."""
