@@ -139,6 +139,13 @@ class TestSphinx:
         with pytest.raises(InputRefused, match="the dictionary has no 'xqzzy'"):
             found("sphinx", RecognizerSettings(phrases=("hello", "say xqzzy")))
 
+    @pytest.mark.parametrize("language", ["de", "klingon"])
+    def test_it_knows_english_alone(self, sphinx: SpeechRecognizer, language: str):
+        with pytest.raises(InputRefused, match=f"English alone, and no '{language}'") as refused:
+            found("sphinx", RecognizerSettings(language=language, phrases=("hello",)))
+        assert refused.value.fault.advice
+        assert found("sphinx", RecognizerSettings(language="en_GB", phrases=("hello",)))
+
     def test_silence_and_next_to_no_sound_have_no_words(self, sphinx: SpeechRecognizer):
         for count in (0, 1, 100, 16000):
             listening = sphinx.listen()
