@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import aiohttp
 import pytest
 
+from engage_hri.services.bus.zenoh.hub import open_hub
 from tests.bus.places import free_endpoint
 from tests.console import browser
 from tests.console.browser import Page, waited
@@ -58,11 +59,12 @@ PERSON = "window.stage.state.person"
 
 
 class Place(NamedTuple):
-    """Addresses of the stage and of the workshop, and the port of a browser."""
+    """Addresses of the stage and of the workshop, the port of a browser, and where the robot's bus is."""
 
     stage: str
     workshop: str
     port: int
+    endpoint: str
 
     @property
     def home(self) -> str:
@@ -80,10 +82,10 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
         waited(robot, folder / "up", b"(all services are up)")
         stage, workshop = (waited(window, folder / "console", each) for each in (STAGE, URL))
         if browser.CHROMIUM is None:
-            yield Place(stage, workshop, 0)
+            yield Place(stage, workshop, 0, endpoint)
         else:
             with browser.running(folder / "browser") as port:
-                yield Place(stage, workshop, port)
+                yield Place(stage, workshop, port, endpoint)
 
 
 @asynccontextmanager
@@ -334,6 +336,29 @@ async def test_what_becomes_of_who_does_nothing_and_what_a_visitor_is_told_first
 
 
 @needs_browser
+async def test_nobody_is_told_to_press_a_microphone_that_was_just_not_to_be_had(place: Place) -> None:
+    hint = "document.querySelector('.hint').textContent"
+    none = "navigator.mediaDevices.getUserMedia = async () => { throw new DOMException('no', 'NotFoundError'); };"
+    async with await open_hub("robot", connect=(place.endpoint,)) as hub, opened(place) as page:
+        hub.join("hearing", "perception").declare_alive()
+        await page.until("window.stage.state.talk.hears")
+        await sit(page)
+        await page.value(f"{none};0")
+        await press(page, ".hold")
+        await page.until(f"{hint}.includes('none is plugged in')")
+        await page.value(LATER % 13_000)
+        await page.until(f"!{hint}.includes('none is plugged in')")
+        assert await page.value(hint) == "Type what you want to say."
+
+        await page.value("void (navigator.mediaDevices.getUserMedia = () => new Promise(() => {}))")
+        await press(page, ".hold")
+        await page.until(f"{hint}.includes('asks you')")
+        await press(page, ".hold")
+        await page.value(LATER % 13_000)
+        await page.until(f"{hint} === 'Press the microphone, and talk.'")
+
+
+@needs_browser
 async def test_axe_finds_nothing_to_complain_of(place: Place) -> None:
     axe = resources.files("axe_core_python").joinpath("axe.min.js").read_text(encoding="utf-8")
     checks = """axe.run().then(({ violations, passes }) =>
@@ -421,7 +446,7 @@ async def test_a_visitor_of_a_minute_on_a_phone_never_scrolls(tmp_path: Path, pl
     """At a kiosk: greeted, asked, lays what is asked, talks, leaves; and the next one finds it new."""
     with engage(tmp_path / "demo", "demo", "--kiosk", BROWSER="true %s") as demo:
         url = waited(demo, tmp_path / "demo", STAGE)
-        async with opened(Place(url, url.partition("stage")[0], place.port)) as page:
+        async with opened(place._replace(stage=url, workshop=url.partition("stage")[0])) as page:
             loop = asyncio.get_running_loop()
             began = loop.time()
             scrolled: list[Any] = []

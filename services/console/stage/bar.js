@@ -185,8 +185,10 @@ export function bar({ top, bottom, order, turn, session }) {
     get isSpeaking() {
       return isSpeaking;
     },
-    get isHeard() {
-      return sounds.microphone.state === "on";
+    // The microphone, for who wants to talk: none (the robot hears nobody), off, on, or lacking, until it is pressed again.
+    get ear() {
+      const { state, isLacking } = sounds.microphone;
+      return !last?.hears ? "none" : state === "on" ? "on" : isLacking ? "lacking" : "off";
     },
     // What is wrong with microphone or voice, in words; empty: nothing.
     get trouble() {

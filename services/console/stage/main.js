@@ -178,9 +178,9 @@ function hint(now) {
   const thing = (id) => state.scene.things.find((each) => each.id === id)?.label ?? id;
   const met = moment(talk, state.scene.robot, person);
   const next = visit(now - idle, { seated: true, kiosk: isKiosk, touched });
-  const tips = text.tips(talk.hears, bar.isHeard);
+  const tips = text.tips(bar.ear);
   if (next.do === "tip" && met?.text !== "looking") return tips[next.number % tips.length];
-  if (met?.text === "looking" && talk.hears && !bar.isHeard) return tips[0];
+  if (met?.text === "looking" && ["off", "lacking"].includes(bar.ear)) return tips[0];
   if (met) return typeof text[met.text] === "function" ? text[met.text](thing(met.about)) : text[met.text];
   return tips[0];
 }

@@ -37,9 +37,9 @@ const ENGLISH = {
   mutual: "You look into each other's eyes.",
   meet: "The robot looks at you. Touch its face to look back.",
   listen: "The robot is speaking to you.",
-  tips: (hears, isOn) => [
-    ...(hears ? [isOn ? "Just talk: the robot hears you." : "Press the microphone, and talk."] : []),
-    "Touch a piece to look at it.", "Drag a piece to move it.", ...(hears ? [] : ["Hold the round button, and talk."]), "Choose Point, and touch a piece.",
+  tips: (ear) => [
+    ...({ on: ["Just talk: the robot hears you."], off: ["Press the microphone, and talk."], lacking: ["Type what you want to say."] }[ear] ?? []),
+    "Touch a piece to look at it.", "Drag a piece to move it.", ...(ear === "none" ? ["Hold the round button, and talk."] : []), "Choose Point, and touch a piece.",
   ],
   pointing: "Touch what you point at.",
   moved: "You move it.",
@@ -93,9 +93,9 @@ const GERMAN = {
   mutual: "Ihr schaut euch in die Augen.",
   meet: "Der Roboter schaut dich an. Berühre sein Gesicht, um zurückzuschauen.",
   listen: "Der Roboter spricht mit dir.",
-  tips: (hears, isOn) => [
-    ...(hears ? [isOn ? "Sprich einfach: der Roboter hört dich." : "Drück auf das Mikrofon, und sprich."] : []),
-    "Berühre ein Teil, um es anzusehen.", "Zieh ein Teil, um es zu bewegen.", ...(hears ? [] : ["Halte den runden Knopf, und sprich."]), "Wähle Zeigen, und berühre ein Teil.",
+  tips: (ear) => [
+    ...({ on: ["Sprich einfach: der Roboter hört dich."], off: ["Drück auf das Mikrofon, und sprich."], lacking: ["Schreib, was du sagen willst."] }[ear] ?? []),
+    "Berühre ein Teil, um es anzusehen.", "Zieh ein Teil, um es zu bewegen.", ...(ear === "none" ? ["Halte den runden Knopf, und sprich."] : []), "Wähle Zeigen, und berühre ein Teil.",
   ],
   pointing: "Berühre, worauf du zeigst.",
   moved: "Du bewegst es.",
