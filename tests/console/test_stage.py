@@ -336,6 +336,40 @@ async def test_what_becomes_of_who_does_nothing_and_what_a_visitor_is_told_first
 
 
 @needs_browser
+async def test_two_visitors_see_the_table_each_from_their_own_place_and_are_called_as_the_page_calls_somebody(
+    place: Place,
+) -> None:
+    words = "['.sit', '.what'].map((each) => document.querySelector(each).textContent)"
+    names = "[...document.querySelectorAll('.heads .name b')].map((each) => each.textContent)"
+    async with opened(place) as one:
+        await sit(one)
+        async with opened(place, language="de-AT") as other:
+            await other.until(f"{SEAT}.textContent === 'Auch hinsetzen'")
+            assert (await other.value(words))[1].startswith("Jemand ist schon hier. ")
+            await other.until(f"{names}.join() === 'Gast'")
+            await press(other, ".other")
+            await other.until(f"{names}.join() === 'Visitor'")
+            assert (await other.value(words))[0] == "Sit down, too"
+            assert (await other.value(words))[1].startswith("Somebody is here already. ")
+            await sit(other)
+        named = """import('./stage/words.js').then(({ texts }) => ["en", "de"].map((name) => texts(name, "en"))
+          .map(({ beside, others, listed }) => [["ann"], ["ann", "ben"], ["ann", "visitor"]]
+            .map((ids) => [beside(listed(ids)), others(listed(ids), ids.length)])))"""
+        assert await one.value(named) == [
+            [
+                ["Sit down beside ann", "ann is here already."],
+                ["Sit down beside ann and ben", "ann and ben are here already."],
+                ["Sit down, too", "Others are here already."],
+            ],
+            [
+                ["Neben ann setzen", "ann ist schon hier."],
+                ["Neben ann und ben setzen", "ann und ben sind schon hier."],
+                ["Auch hinsetzen", "Andere sind schon hier."],
+            ],
+        ]
+
+
+@needs_browser
 async def test_nobody_is_told_to_press_a_microphone_that_was_just_not_to_be_had(place: Place) -> None:
     hint = "document.querySelector('.hint').textContent"
     none = "navigator.mediaDevices.getUserMedia = async () => { throw new DOMException('no', 'NotFoundError'); };"

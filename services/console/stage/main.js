@@ -97,7 +97,7 @@ function readOut(isBefore) {
     if (isBefore) continue;
     const line = document.createElement("p");
     line.lang = robotSpeaks;
-    line.textContent = `${turn.actor === state.person ? state.text.you : turn.actor === state.robot ? state.text.robot : turn.actor}: ${turn.words}`;
+    line.textContent = `${turn.actor === state.person ? state.text.you : turn.actor === state.robot ? state.text.robot : state.text.called(turn.actor)}: ${turn.words}`;
     at(".read").append(line);
     while (at(".read").children.length > 12) at(".read").firstChild.remove();
   }

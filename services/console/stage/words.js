@@ -11,9 +11,9 @@ const ENGLISH = {
   welcome: "Sit down, look, point, talk. The robot looks back.",
   sit: "Sit down and talk",
   sitting: "Sitting down…",
-  beside: (names) => `Sit down beside ${names}`,
-  others: (names) => `${names} ${names.includes(" and ") ? "are" : "is"} here already.`,
-  and: " and ",
+  beside: (names) => (names ? `Sit down beside ${names}` : "Sit down, too"),
+  others: (names, count) => `${names || (count > 1 ? "Others" : "Somebody")} ${count > 1 ? "are" : "is"} here already.`,
+  visitor: "Visitor",
   hold: "Hold to talk",
   microphone: { off: "Microphone: press to talk", asked: "Microphone: ask no more", on: "Microphone is on: switch it off" },
   loud: "The robot's voice",
@@ -67,9 +67,9 @@ const GERMAN = {
   welcome: "Hinsetzen, hinsehen, zeigen, sprechen. Der Roboter schaut zurück.",
   sit: "Hinsetzen und reden",
   sitting: "Du setzt dich…",
-  beside: (names) => `Neben ${names} setzen`,
-  others: (names) => `${names} ${names.includes(" und ") ? "sind" : "ist"} schon hier.`,
-  and: " und ",
+  beside: (names) => (names ? `Neben ${names} setzen` : "Auch hinsetzen"),
+  others: (names, count) => `${names || (count > 1 ? "Andere" : "Jemand")} ${count > 1 ? "sind" : "ist"} schon hier.`,
+  visitor: "Gast",
   hold: "Halten und sprechen",
   microphone: { off: "Mikrofon: drücken und sprechen", asked: "Mikrofon: nicht mehr fragen", on: "Mikrofon ist an: ausschalten" },
   loud: "Die Stimme des Roboters",
@@ -115,6 +115,7 @@ const GERMAN = {
 };
 const ALL = { en: ENGLISH, de: GERMAN };
 
+const NAMELESS = /^visitor(-\d+)?$/; // ids of who sat down without a name (seats.py), or is only heard (speeches.py)
 // The languages that a browser asks for, first the best; English, where there is none of ours.
 export function language(wanted) {
   return wanted.map((each) => each.slice(0, 2).toLowerCase()).find((each) => each in ALL) ?? "en";
@@ -127,6 +128,10 @@ export function texts(name, spoken) {
   const isOther = spoken.split("-")[0].toLowerCase() !== name;
   return {
     ...own,
+    // How a person is called: by their name, or as somebody who has none.
+    called: (id) => (NAMELESS.test(id) ? id.replace("visitor", own.visitor).replace("-", " ") : id),
+    // The names of several; empty: not all of them have one.
+    listed: (ids) => (ids.some((id) => NAMELESS.test(id)) ? "" : new Intl.ListFormat(name).format(ids)),
     welcome: isOther ? `${own.welcome} ${own.speaking(called)}` : own.welcome,
     type: isOther ? own.typing(called) : own.type,
     quick: own.quick.map(([label, , how], index) => [label, ALL[language([spoken])].quick[index][1], how]),
