@@ -43,6 +43,15 @@ CUT = """(({ scene, person }, { onPage }, box) => [
 ].map(onPage).filter(({ x, y }) => x < 0 || x > box.width || y < 0 || y > box.bottom)
 )(window.stage.state, window.stage.shown, window.stage.box)"""
 """Places of the table's edge, the robot and the free seat that the page does not show."""
+HIDDEN = """(({ scene, person }, { onPage }) => {
+  const things = scene.things.filter(({ kind }) => kind === "object").map(({ id, at }) => [id, at]);
+  return scene.people.filter(({ id, at }) => at && id !== person).flatMap(({ at: [x, y, z] }) => {
+    const [head, crown] = [[x, y, z], [x, y, z + 0.15]].map((at) => onPage(at));
+    const hides = ({ x, y }) => Math.abs(x - head.x) < head.y - crown.y && y > crown.y;
+    return [[scene.robot, scene.body.eyes], ...things].filter(([, at]) => hides(onPage(at))).map(([id]) => id);
+  });
+})(window.stage.state, window.stage.shown)"""
+"""What lies on the page behind the head or the back of somebody else."""
 CALM = [{"name": "prefers-reduced-motion", "value": "reduce"}]
 SCROLLS = """(({ scrollHeight, scrollWidth }) => scrollY + scrollHeight - innerHeight + scrollWidth - innerWidth
 )(document.documentElement)"""
@@ -352,6 +361,11 @@ async def test_two_visitors_see_the_table_each_from_their_own_place_and_are_call
             assert (await other.value(words))[0] == "Sit down, too"
             assert (await other.value(words))[1].startswith("Somebody is here already. ")
             await sit(other)
+            for width, height in (PHONE, (1366, 768)):
+                await other.look(width, height)
+                await other.call("Emulation.setEmulatedMedia", features=CALM)
+                isStill = f"window.stage.box.width === {width} && window.stage.shown.isStill"
+                await other.until(f"{isStill} && !({HIDDEN}).length")
         named = """import('./stage/words.js').then(({ texts }) => ["en", "de"].map((name) => texts(name, "en"))
           .map(({ beside, others, listed }) => [["ann"], ["ann", "ben"], ["ann", "visitor"]]
             .map((ids) => [beside(listed(ids)), others(listed(ids), ids.length)])))"""
