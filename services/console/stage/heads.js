@@ -96,14 +96,15 @@ export function heads(overlay, spoken) {
       }
       for (const person of shown) {
         if (!names.has(person.id)) {
-          const level = element("span", { class: "level" });
-          const made = element("div", { class: "name" }, element("i", { class: "ring" }), element("b", {}, person.id), level);
+          const [name, level] = [element("b", {}), element("span", { class: "level" })];
+          const made = element("div", { class: "name" }, element("i", { class: "ring" }), name, level);
           overlay.append(made);
-          names.set(person.id, { made, level });
+          names.set(person.id, { made, name, level });
         }
-        const { made, level } = names.get(person.id);
+        const { made, name, level } = names.get(person.id);
         const measure = talk.levels.find(({ actor }) => actor === person.id);
         put(made, measure, person.speaks);
+        name.textContent = text.called(person.id);
         level.textContent = person.speaks ? text.speaks : text.levels[measure?.level ?? "unknown"];
         const place = where([person.at[0], person.at[1], person.at[2] - 0.26]);
         made.style.transform = `translate(${Math.round(Math.min(Math.max(place.x, made.offsetWidth / 2 + GAP), box.width - made.offsetWidth / 2 - GAP))}px, ${Math.round(place.y)}px) translate(-50%, 0)`;

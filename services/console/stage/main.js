@@ -97,7 +97,7 @@ function readOut(isBefore) {
     if (isBefore) continue;
     const line = document.createElement("p");
     line.lang = robotSpeaks;
-    line.textContent = `${turn.actor === state.person ? state.text.you : turn.actor === state.robot ? state.text.robot : turn.actor}: ${turn.words}`;
+    line.textContent = `${turn.actor === state.person ? state.text.you : turn.actor === state.robot ? state.text.robot : state.text.called(turn.actor)}: ${turn.words}`;
     at(".read").append(line);
     while (at(".read").children.length > 12) at(".read").firstChild.remove();
   }
@@ -178,9 +178,9 @@ function hint(now) {
   const thing = (id) => state.scene.things.find((each) => each.id === id)?.label ?? id;
   const met = moment(talk, state.scene.robot, person);
   const next = visit(now - idle, { seated: true, kiosk: isKiosk, touched });
-  const tips = text.tips(talk.hears, bar.isHeard);
+  const tips = text.tips(bar.ear);
   if (next.do === "tip" && met?.text !== "looking") return tips[next.number % tips.length];
-  if (met?.text === "looking" && talk.hears && !bar.isHeard) return tips[0];
+  if (met?.text === "looking" && ["off", "lacking"].includes(bar.ear)) return tips[0];
   if (met) return typeof text[met.text] === "function" ? text[met.text](thing(met.about)) : text[met.text];
   return tips[0];
 }

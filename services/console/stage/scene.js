@@ -109,10 +109,18 @@ export function scene(place, insets) {
     goal.far = far;
   }
 
+  // The direction from the middle of the table to where the camera is, for who sits there: behind their own place.
+  function fromSeat() {
+    const [x, y] = told?.people.find((each) => each.id === you)?.at ?? SEAT;
+    const [across, along] = told?.things.find(({ kind }) => kind === "surface")?.at ?? [0, 0];
+    return Math.atan2(y - along, x - across);
+  }
+
   // Returns how far the camera still is from there.
   function look(part, now, isCalm) {
     const direction = new THREE.Vector3(...FROM[camera.aspect > 1 ? "wide" : "tall"][you ? "seat" : "side"]).normalize();
-    if (!you && !isCalm) direction.applyAxisAngle(camera.up, 0.16 * Math.sin(now / 9)); // it goes to and fro, slowly
+    if (you) direction.applyAxisAngle(camera.up, fromSeat());
+    else if (!isCalm) direction.applyAxisAngle(camera.up, 0.16 * Math.sin(now / 9)); // it goes to and fro, slowly
     aim(inView(), direction);
     const swing = part === 1 ? 1 : part * 0.45;
     eye.from.lerp(direction, swing).normalize();

@@ -81,7 +81,7 @@ export function touch({ place, list, scene, state, order, bar }) {
       if (!person || !now) return;
       const rows = [
         ...(now.body?.eyes ? [[now.robot, text.robot, now.body.eyes]] : []),
-        ...now.people.filter((each) => each.at && each.present && each.id !== person).map(({ id, at: place }) => [id, id, place]),
+        ...now.people.filter((each) => each.at && each.present && each.id !== person).map(({ id, at: place }) => [id, text.called(id), place]),
         ...now.things.filter(({ kind }) => kind === "object").map(({ id, label, at: place }) => [id, label, place]),
       ];
       for (const [id, made] of buttons) {

@@ -11,9 +11,9 @@ const ENGLISH = {
   welcome: "Sit down, look, point, talk. The robot looks back.",
   sit: "Sit down and talk",
   sitting: "Sitting down…",
-  beside: (names) => `Sit down beside ${names}`,
-  others: (names) => `${names} ${names.includes(" and ") ? "are" : "is"} here already.`,
-  and: " and ",
+  beside: (names) => (names ? `Sit down beside ${names}` : "Sit down, too"),
+  others: (names, count) => `${names || (count > 1 ? "Others" : "Somebody")} ${count > 1 ? "are" : "is"} here already.`,
+  visitor: "Visitor",
   hold: "Hold to talk",
   microphone: { off: "Microphone: press to talk", asked: "Microphone: ask no more", on: "Microphone is on: switch it off" },
   loud: "The robot's voice",
@@ -37,9 +37,9 @@ const ENGLISH = {
   mutual: "You look into each other's eyes.",
   meet: "The robot looks at you. Touch its face to look back.",
   listen: "The robot is speaking to you.",
-  tips: (hears, isOn) => [
-    ...(hears ? [isOn ? "Just talk: the robot hears you." : "Press the microphone, and talk."] : []),
-    "Touch a piece to look at it.", "Drag a piece to move it.", ...(hears ? [] : ["Hold the round button, and talk."]), "Choose Point, and touch a piece.",
+  tips: (ear) => [
+    ...({ on: ["Just talk: the robot hears you."], off: ["Press the microphone, and talk."], lacking: ["Type what you want to say."] }[ear] ?? []),
+    "Touch a piece to look at it.", "Drag a piece to move it.", ...(ear === "none" ? ["Hold the round button, and talk."] : []), "Choose Point, and touch a piece.",
   ],
   pointing: "Touch what you point at.",
   moved: "You move it.",
@@ -67,9 +67,9 @@ const GERMAN = {
   welcome: "Hinsetzen, hinsehen, zeigen, sprechen. Der Roboter schaut zurück.",
   sit: "Hinsetzen und reden",
   sitting: "Du setzt dich…",
-  beside: (names) => `Neben ${names} setzen`,
-  others: (names) => `${names} ${names.includes(" und ") ? "sind" : "ist"} schon hier.`,
-  and: " und ",
+  beside: (names) => (names ? `Neben ${names} setzen` : "Auch hinsetzen"),
+  others: (names, count) => `${names || (count > 1 ? "Andere" : "Jemand")} ${count > 1 ? "sind" : "ist"} schon hier.`,
+  visitor: "Gast",
   hold: "Halten und sprechen",
   microphone: { off: "Mikrofon: drücken und sprechen", asked: "Mikrofon: nicht mehr fragen", on: "Mikrofon ist an: ausschalten" },
   loud: "Die Stimme des Roboters",
@@ -93,9 +93,9 @@ const GERMAN = {
   mutual: "Ihr schaut euch in die Augen.",
   meet: "Der Roboter schaut dich an. Berühre sein Gesicht, um zurückzuschauen.",
   listen: "Der Roboter spricht mit dir.",
-  tips: (hears, isOn) => [
-    ...(hears ? [isOn ? "Sprich einfach: der Roboter hört dich." : "Drück auf das Mikrofon, und sprich."] : []),
-    "Berühre ein Teil, um es anzusehen.", "Zieh ein Teil, um es zu bewegen.", ...(hears ? [] : ["Halte den runden Knopf, und sprich."]), "Wähle Zeigen, und berühre ein Teil.",
+  tips: (ear) => [
+    ...({ on: ["Sprich einfach: der Roboter hört dich."], off: ["Drück auf das Mikrofon, und sprich."], lacking: ["Schreib, was du sagen willst."] }[ear] ?? []),
+    "Berühre ein Teil, um es anzusehen.", "Zieh ein Teil, um es zu bewegen.", ...(ear === "none" ? ["Halte den runden Knopf, und sprich."] : []), "Wähle Zeigen, und berühre ein Teil.",
   ],
   pointing: "Berühre, worauf du zeigst.",
   moved: "Du bewegst es.",
@@ -115,6 +115,7 @@ const GERMAN = {
 };
 const ALL = { en: ENGLISH, de: GERMAN };
 
+const NAMELESS = /^visitor(-\d+)?$/; // ids of who sat down without a name (seats.py), or is only heard (speeches.py)
 // The languages that a browser asks for, first the best; English, where there is none of ours.
 export function language(wanted) {
   return wanted.map((each) => each.slice(0, 2).toLowerCase()).find((each) => each in ALL) ?? "en";
@@ -127,6 +128,10 @@ export function texts(name, spoken) {
   const isOther = spoken.split("-")[0].toLowerCase() !== name;
   return {
     ...own,
+    // How a person is called: by their name, or as somebody who has none.
+    called: (id) => (NAMELESS.test(id) ? id.replace("visitor", own.visitor).replace("-", " ") : id),
+    // The names of several; empty: not all of them have one.
+    listed: (ids) => (ids.some((id) => NAMELESS.test(id)) ? "" : new Intl.ListFormat(name).format(ids)),
     welcome: isOther ? `${own.welcome} ${own.speaking(called)}` : own.welcome,
     type: isOther ? own.typing(called) : own.type,
     quick: own.quick.map(([label, , how], index) => [label, ALL[language([spoken])].quick[index][1], how]),

@@ -10,12 +10,13 @@ function lacking() {
 }
 
 // session: gives that of the page's link to the window. face.show: gets the state (off, asked, on), and news: what is to be
-// told, made of words in a language, or null. face.level: gets how loud it is, 0 to 1, while it is on.
+// told, made of words in a language, or null; isLacking: it could not be had when it was pressed. face.level: gets how loud it is, 0 to 1, while it is on.
 export function microphone(session, face) {
   let on = null; // what is open while it is on, or asked for
   let news = null;
+  let isLacking = false; // it could not be had at the last press
 
-  const show = () => face.show({ state: on === null ? "off" : on.ear ? "on" : "asked", news });
+  const show = () => face.show({ state: on === null ? "off" : on.ear ? "on" : "asked", news, isLacking });
   function tell(what) {
     news = what;
     show();
@@ -39,7 +40,9 @@ export function microphone(session, face) {
     try {
       stream = await navigator.mediaDevices.getUserMedia({ audio: { channelCount: 1, echoCancellation: true } });
     } catch (error) {
-      if (on === own) failed((words) => words[error.name] ?? error.message);
+      if (on !== own) return;
+      isLacking = true;
+      failed((words) => words[error.name] ?? error.message);
       return;
     }
     if (on !== own) return stream.getTracks().forEach((track) => track.stop());
@@ -98,8 +101,9 @@ export function microphone(session, face) {
     off: () => off(),
     press() {
       const reason = lacking();
-      if (on) off();
-      else if (reason) tell(reason);
+      if (on) return off();
+      isLacking = Boolean(reason);
+      if (reason) tell(reason);
       else begin();
     },
   };

@@ -48,6 +48,10 @@ class Sphinx(SpeechRecognizer):
             import pocketsphinx
         except ImportError as error:
             raise missing("pocketsphinx", error) from error
+        if settings.language.lower().replace("_", "-").split("-")[0] != "en":
+            reason = f"sphinx understands English alone, and no {settings.language!r}"
+            advice = "another recognizer of docs/hearing.md, or hearing.recognizer= for none: people can type"
+            raise InputRefused(Fault(reason=reason, where="hearing.language", advice=advice))
         phrases = {plain: phrase for phrase in settings.phrases if (plain := _plain(phrase))}
         if not phrases:
             advice = 'hearing.phrases=\'["yes", "no", "the blue one"]\'; for free speech take another recognizer'
