@@ -20,6 +20,7 @@ class EyesConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     width: int = 640
     """Pixels that a camera is asked for."""
     height: int = 480
+    """Height of the pictures of a camera, in pixels."""
     most_faces: int = 4
     """Faces at once."""
     field_of_view: Degrees = 60.0
