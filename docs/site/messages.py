@@ -15,6 +15,7 @@ from engage_hri.schemas import (
     body_faults,
     faults,
     fragments,
+    landmarks,
     participants,
     perception,
     recognition,
@@ -25,8 +26,8 @@ from engage_hri.schemas import (
 )
 
 MODULES: tuple[ModuleType, ...] = (
-    fragments, blocks, behaviors, recognition, perception, sound, world, body, body_faults, requests, faults,
-    participants, units,
+    fragments, blocks, behaviors, recognition, perception, landmarks, sound, world, body, body_faults, requests,
+    faults, participants, units,
 )  # fmt: skip
 
 HEAD = """\
