@@ -307,7 +307,7 @@ async def test_what_a_visitor_has_said_is_read_out_to_them_and_not_to_the_next(p
         await press(page, ".say input")
         await page.call("Input.insertText", text="My name is Xaver.")
         await press(page, ".send")
-        await page.until(f"{read}.includes('You: My name is Xaver.')")
+        await page.until(f"{read}.includes(window.stage.state.text.you + ': My name is Xaver.')")
         await press(page, ".do:last-child")
         await page.until(f"!{PERSON}")
         assert await page.value(read) == ""
