@@ -18,7 +18,6 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from engage_hri.schemas.advice import suggestion
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.landmarks import FaceLandmarks
 from engage_hri.schemas.units import Seconds, Stamp
@@ -30,7 +29,8 @@ from engage_hri.services.perception.child import (
     packed_message,
 )
 from engage_hri.services.perception.eyes.looking import LandmarkSource, SourceSettings
-from engage_hri.services.runtime.installation import LANDMARKS, offers
+from engage_hri.services.perception.offered import make_offered
+from engage_hri.services.runtime.installation import LANDMARKS
 
 OPENING: Seconds = 30.0
 """Time in which a source has to be open: models are loaded, devices wake up."""
@@ -73,19 +73,8 @@ SourceAnswer = SourceOpened | FaceLandmarks | SourceEnded
 
 def opened(order: SourceOrder) -> LandmarkSource:
     """Find a source, import it and open it. Raises InputRefused, and what a device raises."""
-    offered = offers(LANDMARKS)
-    for offer in offered:
-        if offer.name == order.name:
-            try:
-                made: LandmarkSource = offer.load()(order.settings)
-            except ImportError as error:
-                raise InputRefused(
-                    Fault(reason=str(error), where="eyes.source", advice=offer.advice(error))
-                ) from error
-            return made
-    names = sorted({offer.name for offer in offered})
-    advice = suggestion(order.name, names) or f"one of {', '.join(names)}"
-    raise InputRefused(Fault(reason=f"no source {order.name!r}", where="eyes.source", advice=advice))
+    made: LandmarkSource = make_offered(LANDMARKS, "source", order.name, order.settings, "eyes.source")
+    return made
 
 
 class Watching(ABC):

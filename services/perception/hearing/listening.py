@@ -14,7 +14,6 @@ from collections.abc import Callable
 
 import msgspec
 
-from engage_hri.schemas.advice import suggestion
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.perception.child import (
@@ -32,7 +31,8 @@ from engage_hri.services.perception.hearing.recognizing import (
     SpeechOrder,
     SpeechRecognizer,
 )
-from engage_hri.services.runtime.installation import RECOGNIZERS, offers
+from engage_hri.services.perception.offered import make_offered
+from engage_hri.services.runtime.installation import RECOGNIZERS
 
 MAKING: Seconds = 120.0
 """Time in which a recognizer has to be there: it may have a large model to load."""
@@ -59,18 +59,8 @@ class Made(msgspec.Struct, frozen=True, tag=True):
 
 def found(name: str, settings: RecognizerSettings) -> SpeechRecognizer:
     """Find a recognizer, import it and make it. Raises InputRefused."""
-    offered = offers(RECOGNIZERS)
-    for offer in offered:
-        if offer.name == name:
-            try:
-                made: SpeechRecognizer = offer.load()(settings)
-            except ImportError as error:
-                advice = offer.advice(error)
-                raise InputRefused(Fault(reason=str(error), where="hearing.recognizer", advice=advice)) from error
-            return made
-    names = sorted({offer.name for offer in offered})
-    advice = suggestion(name, names) or f"one of {', '.join(names)}"
-    raise InputRefused(Fault(reason=f"no recognizer {name!r}", where="hearing.recognizer", advice=advice))
+    made: SpeechRecognizer = make_offered(RECOGNIZERS, "recognizer", name, settings, "hearing.recognizer")
+    return made
 
 
 class Understanding(ABC):
