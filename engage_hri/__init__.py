@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from engage_hri.services.control.contract.body import Body as Body
     from engage_hri.services.control.contract.body import MovementAuthority as MovementAuthority
     from engage_hri.services.control.contract.body import Reached as Reached
+    from engage_hri.services.generation.head.policy import HeadPolicy as HeadPolicy
 
 _PLACES = {
     "engage_hri.schemas.behaviors": ("Gaze", "Head", "Pointing", "Reference", "Speech", "SpeechOption"),
@@ -88,6 +89,7 @@ _PLACES = {
     "engage_hri.services.control.bases.one_part_motion": ("OrdinaryBody",),
     "engage_hri.services.control.bases.setpoints": ("SetPointBody", "SimulatedServos"),
     "engage_hri.services.client.language_models": ("perform_call", "stream"),
+    "engage_hri.services.generation.head.policy": ("HeadPolicy",),
 }
 _MODULES = {name: module for module, names in _PLACES.items() for name in names}
 
@@ -104,6 +106,7 @@ __all__ = [
     "FragmentOutcome",
     "Gaze",
     "Head",
+    "HeadPolicy",
     "InputRefused",
     "Interjection",
     "JointLimit",

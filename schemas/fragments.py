@@ -236,18 +236,17 @@ class TurnClosed(Struct, frozen=True, kw_only=True, tag="turn_closed", omit_defa
     """What people have said into the turn, by start, and what came of it."""
 
 
-ClaimKind = Literal["inhibition", "fragment", "glance", "response", "hands", "face", "none"]
-
-
 class Claim(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """A wish for the robot's gaze, by which the arbiter decides about the head.
 
-    priority: 1 (inhibition, the strongest) to 6 (face); 0 with kind `none`.
+    kind: `inhibition`, `fragment`, `glance`, `response`, `hands`, `face`, that of an installed package's policy, or
+    `none`.
+    priority: 1 (the strongest) to the number of kinds that the robot follows; 0 with kind `none`.
     target: entity id; empty: hold the direction.
     reason: why, in words, for people.
     """
 
-    kind: ClaimKind
+    kind: str
     priority: int
     target: str = ""
     reason: str = ""

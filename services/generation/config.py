@@ -63,8 +63,9 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     barge_in: Seconds | None = None
     """Seconds of voice after which who speaks into the robot's turn takes the floor, though recognition has not yet
     decided what it is. None: the robot waits for that in silence, and a laugh never takes the floor."""
-    listens: bool = True
-    """Whether the silent robot looks at who speaks, as a listener does."""
+    policies_off: tuple[str, ...] = ()
+    """Names of policies of the head that the robot does not follow: "glance", "response", "listening" (it looks at
+    who speaks), "hands", "face", or one of an installed package."""
     decision_patience: Seconds = 8.0
     """Seconds after a block's end for which undecided connection events may delay the fragment's outcome. Ours."""
     glance_factor: float = 1.0

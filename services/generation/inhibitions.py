@@ -23,7 +23,7 @@ from engage_hri.schemas.behaviors import (
     Wait,
 )
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.fragments import Claim, Inhibit
+from engage_hri.schemas.fragments import Inhibit
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.config import GenerationConfig
 
@@ -81,11 +81,12 @@ SHORTEST: Seconds = 0.1
 class Inhibition(Struct, frozen=True):
     """A claim on the head. mode `hold`: stay on the present target; `stare`: past everything, to the upper right."""
 
-    claim: Claim
+    target: str
+    reason: str
     mode: Literal["release", "hold", "target", "stare"]
 
 
-SPEECH_ONLY = Inhibition(Claim(kind="inhibition", priority=1, reason="speech only: head up right"), "stare")
+SPEECH_ONLY = Inhibition("", "speech only: head up right", "stare")
 """Inhibition in degraded generation: the study had the head there, so that nobody takes it for a look. Thesis 5.3."""
 
 
@@ -119,7 +120,7 @@ class Leases:
             if request.part == "gaze":
                 target = request.target if request.mode == "target" else ""
                 reason = f"{request.requester}: {request.mode}"
-                return Inhibition(Claim(kind="inhibition", priority=1, target=target, reason=reason), request.mode)
+                return Inhibition(target, reason, request.mode)
         return None
 
     @property

@@ -78,8 +78,9 @@ def _from_here(path: Path) -> str:
 if TYPE_CHECKING:
     from importlib.metadata import Distribution, EntryPoint
 
-GROUPS = BODIES, VOICES, SERVICES, RECOGNIZERS, LANDMARKS = (
+GROUPS = BODIES, VOICES, SERVICES, RECOGNIZERS, LANDMARKS, HEAD_POLICIES = (
     "engage.bodies", "engage.voices", "engage.services", "engage.recognizers", "engage.landmarks",
+    "engage.head_policies",
 )  # fmt: skip
 
 

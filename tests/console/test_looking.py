@@ -2,7 +2,7 @@
 
 import pytest
 
-from engage_hri.schemas.fragments import Claim, ClaimKind
+from engage_hri.schemas.fragments import Claim
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.console.web.scene import plainly
 
@@ -35,7 +35,7 @@ WORLD = World(entities=(ANN, HAND, PIECE))
          "the condition of the study leaves it words alone"),
     ],
 )  # fmt: skip
-def test_a_claim_has_plain_words(kind: ClaimKind, target: str, reason: str, does: str, why: str) -> None:
+def test_a_claim_has_plain_words(kind: str, target: str, reason: str, does: str, why: str) -> None:
     shown = plainly(Claim(kind=kind, priority=3, target=target, reason=reason), WORLD)
 
     assert (shown.does, shown.why) == (does, why)

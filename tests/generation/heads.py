@@ -3,7 +3,6 @@
 from collections.abc import Callable
 
 from engage_hri.schemas.body import BodyPose, Ray, RobotState
-from engage_hri.schemas.fragments import Claim
 from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics, WindowStatistics
 from engage_hri.schemas.units import Seconds, Stamp, Vector
@@ -16,7 +15,7 @@ AT = Stamp("test", 0.0)
 
 
 def inhibition(mode: str = "hold", target: str = "") -> Inhibition:
-    return Inhibition(Claim(kind="inhibition", priority=1, target=target, reason=f"manager: {mode}"), mode)  # type: ignore[arg-type]
+    return Inhibition(target, f"manager: {mode}", mode)  # type: ignore[arg-type]
 
 
 INHIBITED = inhibition()

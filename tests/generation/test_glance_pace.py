@@ -5,6 +5,7 @@ import pytest
 from engage_hri.schemas.recognition import Statistics, WindowStatistics
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.head.maintenance_policy import MTBCE_PRIOR, GlanceWatch
+from engage_hri.services.generation.head.scene import HeadScene
 from tests.generation.heads import AT, event
 
 RECENT = 4.0
@@ -12,7 +13,7 @@ RECENT = 4.0
 
 @pytest.fixture
 def watch() -> GlanceWatch:
-    watch = GlanceWatch(GenerationConfig())
+    watch = GlanceWatch(HeadScene("robot", 0.1), GenerationConfig())
     watch.face = "human"
     return watch
 

@@ -4,7 +4,9 @@ import pytest
 
 from engage_hri.schemas.perception import ActorLost
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.head.maintenance_policy import HAND_ONSET, HAND_STILLNESS, HandWatch
+from engage_hri.services.generation.head.scene import HeadScene
 from tests.generation.heads import AT
 
 
@@ -16,13 +18,13 @@ def hand(owner: str, speed: float) -> Entity:
 def test_of_two_moving_hands_the_one_whose_owner_is_lost_is_let_go_and_the_other_is_watched(
     lost: str, watched: str
 ) -> None:
-    watch = HandWatch("robot")
+    watch = HandWatch(HeadScene("robot", 0.1), GenerationConfig())
     both = World(entities=(hand("ann", 1.0), hand("bob", 1.0)))
     watch.feed(both, 0.0)
     moving = HAND_ONSET
-    assert watch.claim(moving) is not None
+    assert watch.claim(moving, ()) is not None
     watch.feed(ActorLost(actor=lost, at=AT), moving)
 
-    claims = [watch.claim(moving + HAND_STILLNESS + later) for later in (0.01, 5.0)]
+    claims = [watch.claim(moving + HAND_STILLNESS + later, ()) for later in (0.01, 5.0)]
 
     assert [claim and claim.target for claim in claims] == [watched, watched]

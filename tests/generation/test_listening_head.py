@@ -264,7 +264,7 @@ def test_after_a_fragments_brief_look_at_a_face_the_head_stays_there_too() -> No
 
 
 def test_it_can_be_switched_off() -> None:
-    stage = company(listens=False)
+    stage = company(policies_off=("listening",))
     speak(stage, 10.0, "ben")
     stage.until(14.0)
 

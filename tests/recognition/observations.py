@@ -5,7 +5,7 @@ from typing import Any
 from engage_hri.schemas.behaviors import Action, Event, EventKind, TurnSignal
 from engage_hri.schemas.blocks import BlockProgress, SyncPointProgress
 from engage_hri.schemas.faults import Cause
-from engage_hri.schemas.fragments import Claim, ClaimKind, HeadOwner
+from engage_hri.schemas.fragments import Claim, HeadOwner
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn
 from engage_hri.schemas.requests import Cancel
@@ -108,7 +108,7 @@ class Log:
     def lost(self, actor: str, at: float) -> list[Effect]:
         return self.feed(ActorLost(actor=actor, at=stamp(at)), at)
 
-    def owner(self, kind: ClaimKind, target: str, at: float) -> list[Effect]:
+    def owner(self, kind: str, target: str, at: float) -> list[Effect]:
         return self.feed(HeadOwner(owner=Claim(kind=kind, priority=2, target=target), since=stamp(at)), at)
 
     def requests_event(self, kind: EventKind, at: float, *objects: str, **event: Any) -> str:

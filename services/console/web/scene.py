@@ -15,7 +15,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.body import Capabilities, RobotState
 from engage_hri.schemas.footprints import SIDES, corners, overlap, poses_touching
-from engage_hri.schemas.fragments import Claim, ClaimKind
+from engage_hri.schemas.fragments import Claim
 from engage_hri.schemas.units import Meters, Radians, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.console.view import Actor, Scene
@@ -189,7 +189,7 @@ def _on_surface(world: World, place: Vector) -> Vector:
     return place
 
 
-WHY: dict[ClaimKind, str] = {
+WHY: dict[str, str] = {
     "inhibition": "somebody keeps its gaze there",
     "fragment": "this belongs to what it is saying",
     "glance": "nothing has passed between them for a while",
@@ -199,7 +199,7 @@ WHY: dict[ClaimKind, str] = {
     "none": "it has not seen anybody yet",
 }
 """Reason by the kind of a claim, where nothing more is known."""
-CLOSER: dict[tuple[ClaimKind, str], str] = {
+CLOSER: dict[tuple[str, str], str] = {
     ("fragment", "until its block ends"): "it has not finished what it is saying",
     ("fragment", "thinks"): "it thinks about what to say next",
     ("hands", "manipulates"): "this hand is moving a thing",
@@ -258,4 +258,4 @@ def _why(claim: Claim) -> str:
     what, of, who = claim.reason.rpartition(" of ")
     if claim.kind == "response" and of and what in ANSWERED:
         return ANSWERED[what].format(who)
-    return CLOSER.get((claim.kind, begins), WHY[claim.kind])
+    return CLOSER.get((claim.kind, begins), WHY.get(claim.kind, claim.reason))

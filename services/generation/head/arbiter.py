@@ -1,28 +1,31 @@
-"""Arbiter of the robot's head: six claims by priority, one owner at a time. Thesis 3.3.4.
+"""Arbiter of the robot's head: claims by priority, one owner at a time. Thesis 3.3.4.
 
-A higher claim takes over at once; when the owner lets go the head stays for a dwell before a lower claim gets it.
-From a face that it has just gone to it goes to another one by a higher claim than those of the people (4 to 6) only.
-Claims 3 to 6 move the base gaze by `gazeShift` blocks, which end on arrival and hold nothing. A fragment's own gaze
-lies over the base gaze: while it owns the head no shift is sent, with two exceptions. While that gaze is on a face
-the base gaze goes there, too, unseen: at the end of a turn the head must not fall back to where it was before. And
-when an inhibition that holds the head has that gaze aborted, the base gaze goes to its target: else the head would
-go home.
+The claims are those of the policies, in the order of `policies.py`. A higher claim takes over at once; when the
+owner lets go the head stays for a dwell before a lower claim gets it. From a face that it has just gone to it goes to
+another one by a higher claim than those of the people (response, face) only. Policies move the base gaze by
+`gazeShift` blocks, which end on arrival and hold nothing. A fragment's own gaze lies over the base gaze: while it owns
+the head no shift is sent, with two exceptions. While that gaze is on a face the base gaze goes there, too, unseen: at
+the end of a turn the head must not fall back to where it was before. And when an inhibition that holds the head has
+that gaze aborted, the base gaze goes to its target: else the head would go home.
 """
+
+from collections.abc import Callable, Mapping
+from typing import TypeVar
 
 from msgspec import Struct
 
 from engage_hri.schemas.behaviors import Event, GazeShift, Timing
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.fragments import Claim
-from engage_hri.schemas.recognition import ConnectionEvent, Floor, Statistics
+from engage_hri.schemas.recognition import Statistics
 from engage_hri.schemas.units import Degrees, Radians, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import Acquaintances
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.head.listening_policy import ListeningPolicy
-from engage_hri.services.generation.head.maintenance_policy import FaceWatch, GlanceWatch, HandWatch, OfPeople
-from engage_hri.services.generation.head.response_policy import ResponsePolicy
+from engage_hri.services.generation.head.orders import FragmentPolicy, InhibitionPolicy
+from engage_hri.services.generation.head.policies import OWN, arranged
+from engage_hri.services.generation.head.policy import HeadPolicy
+from engage_hri.services.generation.head.scene import NOBODY, HeadScene, Observation
 from engage_hri.services.generation.inhibitions import Inhibition
 from engage_hri.services.reports.same_people import renamed
 
@@ -36,10 +39,9 @@ second. Ours."""
 RETRY: Seconds = 1.0
 """Pause before a gaze shift that failed is tried again, so that a body that cannot is not asked
 all the time. Ours."""
-NOBODY = Claim(kind="none", priority=0, reason="nobody has been seen")
+Answer = TypeVar("Answer")
 UP_RIGHT: Degrees = 60.0
 """Angle past the table: as far as the neck turns, at nothing that anybody could mean. Thesis 5.3."""
-Observation = World | RobotState | Statistics | ConnectionEvent | Floor | OfPeople
 
 
 class Aim(Struct, frozen=True):
@@ -93,25 +95,27 @@ class Ruling(Struct, frozen=True):
 
 
 class Arbiter:
-    """The six claims and the owner of the head. `feed` it what happens; `rule` then, and when `deadline` has come."""
+    """The policies and the owner of the head. `feed` it what happens; `rule` then, and when `deadline` has come.
 
-    def __init__(self, robot: str, config: GenerationConfig) -> None:
-        self._robot, self._config = robot, config
-        self._responses = ResponsePolicy(robot)
-        self._listening = ListeningPolicy(robot)
-        self._hands = HandWatch(robot)
-        self._faces = FaceWatch(robot)
-        self._glances = GlanceWatch(config)
+    policies: of installed packages, beside ours. One that raises is dropped: the head goes on without it.
+    """
+
+    def __init__(self, robot: str, config: GenerationConfig, policies: Mapping[str, type[HeadPolicy]] = {}) -> None:
+        self._config = config
+        self._scene = scene = HeadScene(robot, config.gaze_half_angle or 0.1)
+        self._orders = InhibitionPolicy(scene, config)
+        self._fragments = FragmentPolicy(scene, config)
+        ordered = {InhibitionPolicy: self._orders, FragmentPolicy: self._fragments}
+        self._policies: list[HeadPolicy] = []
+        self.mistakes: list[tuple[str, Exception]] = []
+        """Policies that have raised, and what, until somebody takes them."""
+        kinds: dict[str, int] = {}
+        for name, each in arranged(config, policies).items():
+            policy = ordered.get(each) or each(scene, config)
+            policy.name, policy.kind = name, policy.kind or name
+            policy.priority = kinds.setdefault(policy.kind, len(kinds) + 1)
+            self._policies.append(policy)
         self._people = Acquaintances()
-        self._inhibition: Inhibition | None = None
-        self._fragment: Claim | None = None
-        self._waits = False
-        """The robot's last turn is over, and no other has begun."""
-        self._thought: Claim | None = None
-        self._world: World | None = None
-        self._state: RobotState | None = None
-        self._half_angle: Radians = config.gaze_half_angle or 0.1
-        self._owner = NOBODY
         self._since: Seconds = 0.0
         self._waiting: tuple[Claim, ...] | None = None
         """Claims without the head; None before the first ruling, so that this counts as changed."""
@@ -128,81 +132,61 @@ class Arbiter:
         """Place that the last shift did not reach, and when to try it again."""
         self._shifts = 0
 
+    @property
+    def _owner(self) -> Claim:
+        return self._scene.owner
+
     # -- what happens ---------------------------------------------------------------------------------------------
 
     def feed(self, observation: Observation, now: Seconds) -> None:
         match observation:
             case World():
-                self._world = observation
-                self._hands.feed(observation, now)
-                self._faces.feed(observation, now)
                 self._people.see([person.id for person in observation.people], now)
-            case RobotState():
-                self._state = observation
-            case Statistics(actor=actor):
-                self._glances.feed(observation, now)
-                if actor:
-                    self._people.hear(actor, now)
-            case Floor():
-                if self._config.listens:
-                    self._listening.feed(observation, now)
-            case ConnectionEvent():
-                if observation.kind == "adjacency_pair" and observation.initiator == self._robot:
-                    self._faces.partner = observation.answered_by or self._faces.partner
-                self._listening.feed(observation, now)
-                self._glances.feed(observation, now)
-                self._responses.feed(
-                    observation,
-                    now,
-                    world=self._world,
-                    gaze=self._state.gaze if self._state else None,
-                    half_angle=self._half_angle,
-                    fragment_target=self._owner.target if self._owner.kind == "fragment" else "",
-                )
-            case _:
-                self._hands.feed(observation, now)
-                self._faces.feed(observation, now)
+            case Statistics(actor=actor) if actor:
+                self._people.hear(actor, now)
+        self._scene.feed(observation, now)
+        self._ask(lambda policy: policy.feed(observation, now))
 
     def gaze_perceived_within(self, half_angle: Radians) -> None:
         """Take the half angle of the body's gaze cone; one in the configuration goes before."""
-        self._half_angle = self._config.gaze_half_angle or half_angle
+        self._scene.half_angle = self._config.gaze_half_angle or half_angle
 
     def inhibit(self, inhibition: Inhibition | None) -> None:
         """Take the inhibition in force: that of the newest lease on gaze, if there is one."""
-        self._inhibition = inhibition
-        if self._mode != "hold":
+        self._orders.inhibition = inhibition
+        if self._orders.mode != "hold":
             self._held = NOWHERE
 
     def fragment_gazes(self, target: str, reason: str = "") -> None:
         """Note that a gaze of a fragment has started."""
-        self._fragment = Claim(kind="fragment", priority=2, target=target, reason=reason)
+        self._fragments.gazes(target, reason)
 
     def fragment_shifts(self, target: str, reason: str = "") -> None:
         """Note that a fragment has started to move the base gaze."""
-        self.fragment_gazes(target, reason)
+        self._fragments.gazes(target, reason)
         self._base = Aim(target)
 
     def fragment_rests(self) -> None:
         """Note that a fragment's gaze has ended and its block has not: it keeps the head, on the base gaze."""
-        self._fragment = Claim(kind="fragment", priority=2, target=self._base.target, reason="until its block ends")
+        self._fragments.gazes(self._base.target, "until its block ends")
 
     def fragment_lets_go(self) -> None:
         """Note that the blocks of all fragments that moved the head have ended."""
-        self._fragment = None
+        self._fragments.lets_go()
 
     def think(self, target: str) -> None:
         """Claim the head for `target` until the turn's next fragment: the robot averts its gaze to think."""
-        self._thought = Claim(kind="fragment", priority=2, target=target, reason="thinks")
+        self._fragments.think(target)
 
     def stop_thinking(self) -> None:
-        self._thought = None
+        self._fragments.think("")
 
     def speak_to(self, person: str) -> None:
-        self._faces.partner, self._waits = person, False
+        self._scene.partner, self._scene.waits = person, False
 
     def wait_for_answers(self) -> None:
         """Note that the robot's turn is over: from now on those whom it has asked may answer."""
-        self._waits = True
+        self._scene.waits = True
 
     def join(self, other: str, name: str) -> None:
         """Take two ids for one person, who is called `name` from now on. The next world has nobody called `other`."""
@@ -210,11 +194,10 @@ class Arbiter:
         def joined(id: str) -> str:
             return name if id == other else id
 
-        self._faces.join(other, name)
-        self._glances.forget(other)
-        self._owner = renamed(self._owner, joined)
+        self._scene.join(other, name)
+        self._ask(lambda policy: policy.join(other, name))
+        self._scene.owner = renamed(self._owner, joined)
         self._base, self._held = renamed(self._base, joined), renamed(self._held, joined)
-        self._fragment, self._thought = (each and renamed(each, joined) for each in (self._fragment, self._thought))
 
     def shift_failed(self, id: str, now: Seconds) -> None:
         """Note that shift `id` did not arrive: the same place is tried again after a pause, any other at once."""
@@ -228,14 +211,14 @@ class Arbiter:
 
     def recognition_lost(self) -> None:
         """Drop what recognition told: the ends of its events and speeches will never come."""
-        self._responses.forget()
-        self._listening.forget()
+        self._scene.recognition_lost()
+        self._ask(lambda policy: policy.recognition_lost())
 
     # -- what follows ---------------------------------------------------------------------------------------------
 
     @property
     def deadline(self) -> Seconds | None:
-        due = [each.deadline for each in (self._hands, self._faces, self._glances, self._responses, self._listening)]
+        due = self._ask(lambda policy: policy.deadline)
         due.append(self._failed[1] if self._failed else None)
         if self._stays_until is not None:
             due.append(self._stays_until)
@@ -246,53 +229,62 @@ class Arbiter:
     def rule(self, now: Seconds) -> Ruling:
         """Decide on the owner by now, and on the gaze shift that takes the head to its target."""
         for person in self._people.forgotten(now):
-            self._faces.forget(person)
-            self._glances.forget(person)
+            self._forget(person)
         claims = self._claims(now)
         before, waited = self._owner, self._waiting
         if waited is None:
             self._since = now
-        self._owner = self._next_owner(claims, now)
-        if self._owner.target != before.target:
+        owner = self._scene.owner = self._next_owner(claims, now)
+        if owner.target != before.target:
             self._looks_since = now
-        if self._owner != before:
+        if owner != before:
             self._lapsed = None
-            arrives = self._owner.kind == "inhibition" != before.kind
-            if arrives and self._mode == "hold" and self._fragment is not None:
-                self._held = Aim(self._fragment.target)
-            if (self._owner.kind, self._owner.target) != (before.kind, before.target):
+            arrives = owner.kind == "inhibition" != before.kind
+            if arrives and self._orders.mode == "hold" and self._fragments.gaze is not None:
+                self._held = Aim(self._fragments.gaze.target)
+            if (owner.kind, owner.target) != (before.kind, before.target):
                 self._since = now
-            if self._owner.kind == "glance" != before.kind:
-                self._glances.began(now)
-        if before.kind == "glance" != self._owner.kind:
-            self._glances.ended(now)
-        self._faces.has_head(self._owner.kind == "face", now)
-        self._glances.head_is_on_face(self._faces.is_face(self._head_on()), now)
-        self._waiting = tuple(claim for claim in claims if claim.kind != self._owner.kind)
-        changed = self._owner != before or self._waiting != waited
-        return Ruling(self._owner, self._since, self._waiting, changed, self._shift(now))
+        state = self._scene.state
+        self._scene.head_on = owner.target or (state.looking_at if state else "") or self._base.target
+        self._ask(lambda policy: policy.has_head(owner.kind == policy.kind, now))
+        self._waiting = tuple(claim for claim in claims if claim.kind != owner.kind)
+        changed = owner != before or self._waiting != waited
+        return Ruling(owner, self._since, self._waiting, changed, self._shift(now))
+
+    def _forget(self, person: str) -> None:
+        self._scene.sight.forget(person)
+        self._ask(lambda policy: policy.forget(person))
 
     def _claims(self, now: Seconds) -> list[Claim]:
-        face = self._faces.claim(now, self._listening.asked if self._waits else ())
-        self._glances.face = face.target if face else ""
-        present = self._faces.present(now)
-        listens = self._listening.claim(now, present)
-        answers = self._responses.claim(now, {*present} - {*self._listening.drawing(present)})
-        claims = [
-            self._inhibition.claim if self._inhibition else None, self._fragment or self._thought,
-            self._glances.claim(now), answers or listens, self._hands.claim(now), face,
-        ]  # fmt: skip
-        return [claim for claim in claims if claim is not None]
+        """Claims of the policies, the strongest first, one of each kind."""
+        claims: list[Claim] = []
 
-    def _head_on(self) -> str:
-        """The target that the head is on or on its way to: the owner's, else the one that the body says."""
-        return self._owner.target or (self._state.looking_at if self._state else "") or self._base.target
+        def ask(policy: HeadPolicy) -> None:
+            claim = policy.claim(now, claims)
+            if claim is not None:
+                claims[:] = [claim, *(each for each in claims if each.kind != claim.kind)]
+
+        self._ask(ask)
+        return claims
+
+    def _ask(self, question: Callable[[HeadPolicy], Answer]) -> list[Answer]:
+        """Ask all policies, the weakest first, or tell them. A mistake of ours is raised, one of others is noted."""
+        answers = []
+        for policy in self._policies[::-1]:
+            try:
+                answers.append(question(policy))
+            except Exception as error:
+                if type(policy) in OWN.values():
+                    raise
+                self._policies.remove(policy)
+                self.mistakes.append((policy.name, error))
+        return answers
 
     def _next_owner(self, claims: list[Claim], now: Seconds) -> Claim:
         """The claim that gets the head, or still the owner while its look at a face is too short."""
         wanted, ends = self._strongest(claims, now), self._looks_since + LEAST_LOOK
         faces = {self._owner.target, wanted.target}
-        is_brief = now < ends and len(faces) == 2 and faces <= {*self._faces.present(now)}
+        is_brief = now < ends and len(faces) == 2 and faces <= {*self._scene.sight.present(now)}
         self._stays_until = ends if is_brief and wanted.kind in ("response", "face") else None
         return wanted if self._stays_until is None else self._owner
 
@@ -317,7 +309,8 @@ class Arbiter:
             return None
         if self._failed is not None and aim == self._failed[0]:
             return None
-        if owner.kind == "fragment" and self._fragment is not None and not self._faces.is_face(aim.target):
+        lies_over = owner.kind == "fragment" and self._fragments.gaze is not None
+        if lies_over and not self._scene.sight.is_face(aim.target):
             return None
         self._base = aim
         self._shifts += 1
@@ -325,18 +318,14 @@ class Arbiter:
         return Shift(f"{cause}-{self._shifts}", aim.target, glance=owner.kind == "glance", beside=aim.beside)
 
     def _aim(self) -> Aim:
-        if self._owner.kind == "inhibition" and self._mode == "hold":
+        if self._owner.kind == "inhibition" and self._orders.mode == "hold":
             return self._held
-        if self._owner.kind == "inhibition" and self._mode == "stare":
+        if self._owner.kind == "inhibition" and self._orders.mode == "stare":
             return Aim(self._landmark(), beside=True)
         return Aim(self._owner.target)
 
-    @property
-    def _mode(self) -> str:
-        return self._inhibition.mode if self._inhibition is not None else ""
-
     def _landmark(self) -> str:
         """The entity that the head stares past in the study's condition without gaze: a surface, else any; or ""."""
-        entities = self._world.entities if self._world else ()
+        entities = self._scene.world.entities if self._scene.world else ()
         surfaces = [entity.id for entity in entities if entity.kind == "surface"]
         return next(iter([*surfaces, *(entity.id for entity in entities)]), "")

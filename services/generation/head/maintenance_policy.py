@@ -6,19 +6,18 @@ and when nothing has connected them for longer than usual they check with a glan
 
 import math
 from collections import Counter
-from collections.abc import Iterable
-from itertools import takewhile
+from collections.abc import Sequence
 
 from msgspec import Struct
 
 from engage_hri.schemas.fragments import Claim
-from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.bus.deadlines import Absent
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.reports.action_reports import FACE_GRACE
+from engage_hri.services.generation.head.policy import HeadPolicy
+from engage_hri.services.generation.head.scene import HeadScene, Observation
 
 HAND_SPEED = 0.05
 """Speed in m/s above which a hand counts as moving: below it is the noise of vision. Ours."""
@@ -38,8 +37,6 @@ MTBCE_HIGH: Seconds = 15.0
 """Greatest value that the recent mean counts as: silence is no reason to glance no more. Ours."""
 MTBCE_EVENTS = 5
 """Number of connection events, without the robot's glances, from which on the mean is believed. Ours."""
-OfPeople = ActionBegan | ActionEnded | ActorFound | ActorLost
-"""News of people; each watch takes what concerns it."""
 
 
 class _Hand(Struct):
@@ -50,11 +47,13 @@ class _Hand(Struct):
     active: bool = False
 
 
-class HandWatch:
+class HandWatch(HeadPolicy):
     """Claim 5: a hand that moves, or with which its owner manipulates something, until it has been still."""
 
-    def __init__(self, robot: str) -> None:
-        self._robot = robot
+    kind = "hands"
+
+    def __init__(self, scene: HeadScene, config: GenerationConfig) -> None:
+        super().__init__(scene, config)
         self._hands: dict[str, _Hand] = {}
         """Hands that move, or are tracked."""
         self._places: dict[str, Entity] = {}
@@ -62,7 +61,7 @@ class HandWatch:
         """Manipulations under way: actor and targets -> the hand, or the object if no hand of the actor is known."""
         self._watched = ""
 
-    def feed(self, message: World | OfPeople, now: Seconds) -> None:
+    def feed(self, message: Observation, now: Seconds) -> None:
         match message:
             case World():
                 self._places = {entity.id: entity for entity in message.entities}
@@ -91,11 +90,8 @@ class HandWatch:
                 hand.moving_since, hand.still_since = None, now
 
     def _see(self, world: World, now: Seconds) -> None:
-        fast = {
-            entity.id
-            for entity in world.entities
-            if entity.kind == "hand" and entity.owner != self._robot and math.hypot(*entity.velocity) > HAND_SPEED
-        }
+        hands = (each for each in world.entities if each.kind == "hand" and each.owner != self.scene.robot)
+        fast = {hand.id for hand in hands if math.hypot(*hand.velocity) > HAND_SPEED}
         for id in sorted(fast):
             hand = self._hands.setdefault(id, _Hand())
             if hand.moving_since is None:
@@ -130,7 +126,7 @@ class HandWatch:
                 due.append(hand.still_since + HAND_STILLNESS)
         return min(due, default=None)
 
-    def claim(self, now: Seconds) -> Claim | None:
+    def claim(self, now: Seconds, weaker: Sequence[Claim]) -> Claim | None:
         for id, hand in self._hands.items():
             if hand.moving_since is not None and now >= hand.moving_since + HAND_ONSET:
                 hand.active = True
@@ -144,98 +140,44 @@ class HandWatch:
         if self._watched not in active:  # stay with a hand while it moves, however many others do
             self._watched = active[0]
         reason = "manipulates" if self._acting(self._watched) else "moves"
-        return Claim(kind="hands", priority=5, target=self._watched, reason=reason)
+        return self.wish(self._watched, reason)
 
 
-class FaceWatch:
+class FaceWatch(HeadPolicy):
     """Claim 6: the face of the person spoken to last, else the nearest one; if all are lost, the last direction.
 
     While several people are to answer, the face of one after the other: the one named first comes last, for the look
     at the end of the turn was for that one.
     """
 
-    def __init__(self, robot: str) -> None:
-        self._robot = robot
-        self._people: dict[str, Entity] = {}
-        self._here: set[str] = set()
-        """Those with a face who have not been lost; the world may still tell of one who has."""
-        self._lost: Absent[str] = Absent()
-        """Those with a face who have been lost since; they are known until they are forgotten."""
-        self._has_met = False
+    kind = "face"
+
+    def __init__(self, scene: HeadScene, config: GenerationConfig) -> None:
+        super().__init__(scene, config)
         self._seen: Seconds = float("-inf")
         self._followed = ""
-        self.partner = ""
-        """Id of the person spoken to last, or who has answered last."""
         self._goes_round = False
         self._next_at: Seconds | None = None
         """Time to go on to the next one who is to answer; None: the head is not on a face by this claim."""
 
-    def feed(self, message: World | OfPeople, now: Seconds) -> None:
-        match message:
-            case World():
-                seen = {person.id: person for person in message.people if person.id != self._robot}
-                for id in self._people.keys() - seen.keys():
-                    self._lose(id, now)
-                for id in seen.keys() - self._people.keys():
-                    self._find(id)
-                self._people = seen
-                self._has_met |= bool(seen)
-            case ActorLost(actor=actor):
-                self._lose(actor, now)
-            case ActorFound(actor=actor):
-                if actor in self._lost:
-                    self._find(actor)
-
-    def _lose(self, id: str, now: Seconds) -> None:
-        if id in self._here:
-            self._here.discard(id)
-            self._lost.leaves(id, now)
-
-    def _find(self, id: str) -> None:
-        self._lost.comes(id)
-        self._here.add(id)
-
     def join(self, other: str, name: str) -> None:
-        """Take two ids for one person: `other` has not been lost, but is `name`."""
-        self.partner, self._followed = (name if id == other else id for id in (self.partner, self._followed))
-        if other in self._people:
-            self._people[name] = self._people.pop(other)
-            self._find(name)
-        self.forget(other)
-
-    def forget(self, id: str) -> None:
-        """Drop somebody who has been gone for long."""
-        self._here.discard(id)
-        self._lost.comes(id)
-
-    def present(self, now: Seconds) -> list[str]:
-        """Ids of the people with a face that is seen, or was a moment ago; the nearest first."""
-
-        def distance(id: str) -> tuple[float, str]:
-            person = self._people.get(id)
-            return (math.hypot(person.position[0], person.position[1]) if person else math.inf, id)
-
-        missed = takewhile(lambda lost: now < lost[1] + FACE_GRACE, self._lost.latest())
-        return sorted((*self._here, *(id for id, _ in missed)), key=distance)
+        self._followed = name if self._followed == other else self._followed
 
     @property
     def deadline(self) -> Seconds | None:
-        due = (since + FACE_GRACE for _, since in self._lost.latest())
-        lost = takewhile(lambda at: at > self._seen, due)
+        lost = self.scene.sight.changes_after(self._seen)
         return min((*lost, *([] if self._next_at is None else [self._next_at])), default=None)
 
     def has_head(self, has: bool, now: Seconds) -> None:
-        """Note whether the arbiter gives the head to this claim."""
         if not has or not self._goes_round:
             self._next_at = None
         elif self._next_at is None:
             self._next_at = now + ROUND
 
-    def claim(self, now: Seconds, asked: Iterable[str] = ()) -> Claim | None:
-        """asked: ids of the people who are to answer now, in the order in which they were named."""
+    def claim(self, now: Seconds, weaker: Sequence[Claim]) -> Claim | None:
         self._seen = now
-        present = self.present(now)
-        to_answer = [who for who in asked if who in present]
+        present, partner = self.scene.sight.present(now), self.scene.partner
+        to_answer = [who for who in self.scene.asked if who in present] if self.scene.waits else []
         if len(to_answer) > 1:
             is_due = self._next_at is not None and now >= self._next_at
             if is_due or not self._goes_round or self._followed not in to_answer:
@@ -243,30 +185,28 @@ class FaceWatch:
                 self._followed = to_answer[(place + 1) % len(to_answer)]
                 self._next_at = None
             self._goes_round = True
-            return Claim(kind="face", priority=6, target=self._followed, reason="is to answer: others are, too")
+            return self.wish(self._followed, "is to answer: others are, too")
         self._goes_round = False
         if not present:
-            return Claim(kind="face", priority=6, reason="lost: hold the direction") if self._has_met else None
-        if self.partner in present:
-            self._followed = self.partner
+            return self.wish("", "lost: hold the direction") if self.scene.sight.has_met else None
+        if partner in present:
+            self._followed = partner
         elif self._followed not in present:  # stay with a face while it is seen, however people move about
             self._followed = present[0]
-        reason = "spoken with last" if self._followed == self.partner else "nearest when it came"
-        return Claim(kind="face", priority=6, target=self._followed, reason=reason)
-
-    def is_face(self, target: str) -> bool:
-        return target in self._here or target in self._lost
+        return self.wish(self._followed, "spoken with last" if self._followed == partner else "nearest when it came")
 
 
-class GlanceWatch:
+class GlanceWatch(HeadPolicy):
     """Claim 3: a quick look at the face when nothing has connected for longer than usual.
 
     The quiet is counted from the last start of a connection event or from when the head last was on a face,
     whichever is later: a robot that has just looked need not check.
     """
 
-    def __init__(self, config: GenerationConfig) -> None:
-        self._config = config
+    kind = "glance"
+
+    def __init__(self, scene: HeadScene, config: GenerationConfig) -> None:
+        super().__init__(scene, config)
         self._statistics: dict[str, Statistics] = {}
         self._quiet_since: Seconds | None = None
         self._on_face = False
@@ -278,7 +218,7 @@ class GlanceWatch:
         self.face = ""
         """Id of the person at whom a glance would look; empty: there is none."""
 
-    def feed(self, message: Statistics | ConnectionEvent, now: Seconds) -> None:
+    def feed(self, message: Observation, now: Seconds) -> None:
         match message:
             case Statistics(actor=actor):
                 self._statistics[actor] = message
@@ -290,24 +230,19 @@ class GlanceWatch:
                 if cause == "maintenance":
                     self._own.update((responder, ""))
 
-    def forget(self, actor: str) -> None:
-        """Drop somebody who has been gone for long, as recognition does."""
-        self._statistics.pop(actor, None)
-        self._own.pop(actor, None)
+    def forget(self, person: str) -> None:
+        self._statistics.pop(person, None)
+        self._own.pop(person, None)
 
-    def head_is_on_face(self, on_face: bool, now: Seconds) -> None:
+    def has_head(self, has: bool, now: Seconds) -> None:
+        if has and self._until is None:
+            self._until = now + GLANCE_DURATION
+        elif not has and self._until is not None:
+            self._until, self._quiet_since = None, now
+        on_face = self.scene.sight.is_face(self.scene.head_on)
         if self._on_face != on_face or self._quiet_since is None:
             self._quiet_since = now
         self._on_face = on_face
-
-    def began(self, now: Seconds) -> None:
-        """Note that the arbiter gives the head to the glance."""
-        self._until = now + GLANCE_DURATION
-
-    def ended(self, now: Seconds) -> None:
-        """Note that the arbiter has taken the head from the glance."""
-        self._until = None
-        self._quiet_since = now
 
     @property
     def pace(self) -> Seconds:
@@ -325,17 +260,18 @@ class GlanceWatch:
     def _due(self) -> Seconds | None:
         if self._on_face or not self.face or self._quiet_since is None:
             return None
-        return self._quiet_since + self._config.glance_factor * self.pace
+        return self._quiet_since + self.config.glance_factor * self.pace
 
     @property
     def deadline(self) -> Seconds | None:
         due = self._until if self._until is not None else self._due
         return due if due is not None and due > self._seen else None
 
-    def claim(self, now: Seconds) -> Claim | None:
+    def claim(self, now: Seconds, weaker: Sequence[Claim]) -> Claim | None:
         self._seen = now
+        self.face = next((claim.target for claim in weaker if claim.kind == FaceWatch.kind), "")
         wanted = now < self._until if self._until is not None else self._due is not None and now >= self._due
         if not wanted or not self.face:
             return None
-        quiet = self._config.glance_factor * self.pace
-        return Claim(kind="glance", priority=3, target=self.face, reason=f"quiet for longer than {quiet:.1f} s")
+        quiet = self.config.glance_factor * self.pace
+        return self.wish(self.face, f"quiet for longer than {quiet:.1f} s")

@@ -6,7 +6,7 @@ words takes knowledge of the task: that is the collaboration manager's.
 """
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from statistics import fmean
 
 from msgspec import Struct
@@ -17,6 +17,9 @@ from engage_hri.schemas.fragments import Claim
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.head.policy import HeadPolicy
+from engage_hri.services.generation.head.scene import HeadScene, Observation
 from engage_hri.services.generation.references.pairs import TOLERANCE, angle_off_axis
 
 RESPONSE_HOLD: Seconds = 0.8
@@ -37,39 +40,39 @@ class _Answer(Struct):
     until: Seconds | None = None
 
 
-class ResponsePolicy:
+class ResponsePolicy(HeadPolicy):
     """The human-initiated events that are open, newest last."""
 
-    def __init__(self, robot: str) -> None:
-        self._robot = robot
+    kind = "response"
+
+    def __init__(self, scene: HeadScene, config: GenerationConfig) -> None:
+        super().__init__(scene, config)
         self._open: dict[str, _Answer] = {}
         self._seen: Seconds = float("-inf")
 
-    def feed(
-        self,
-        event: ConnectionEvent,
-        now: Seconds,
-        *,
-        world: World | None,
-        gaze: Ray | None,
-        half_angle: Radians,
-        fragment_target: str = "",
-    ) -> None:
-        """Take an event. fragment_target: of a fragment's gaze; directing to anything else is not answered then."""
-        if event.initiator == self._robot or event.responder != self._robot or event.kind not in ANSWERED:
+    def feed(self, message: Observation, now: Seconds) -> None:
+        if isinstance(message, ConnectionEvent):
+            self._take(message, now)
+
+    def _take(self, event: ConnectionEvent, now: Seconds) -> None:
+        """Take an event. While a fragment's gaze has the head, directing to anything else is not answered."""
+        scene = self.scene
+        if event.initiator == scene.robot or event.responder != scene.robot or event.kind not in ANSWERED:
             return
         if event.state == "started":
             targets: tuple[str, ...] = (event.initiator,)
             if event.kind == "directed_gaze":
-                targets = viewing_order(event.objects, world, gaze, half_angle)
-            if targets and fragment_target in ("", *targets):
+                gaze = scene.state.gaze if scene.state is not None else None
+                targets = viewing_order(event.objects, scene.world, gaze, scene.half_angle)
+            told = scene.owner.target if scene.owner.kind == "fragment" else ""
+            if targets and told in ("", *targets):
                 self._open[event.id] = _Answer(event, targets, now)
         elif event.state == "succeeded" and event.id in self._open:
             self._open[event.id].until = now + RESPONSE_HOLD
         else:
             self._open.pop(event.id, None)
 
-    def forget(self) -> None:
+    def recognition_lost(self) -> None:
         self._open.clear()
 
     @property
@@ -80,9 +83,10 @@ class ResponsePolicy:
             due += [turn for turn in self._turns(answer) if turn > self._seen]
         return min(due, default=None)
 
-    def claim(self, now: Seconds, others: Collection[str] = ()) -> Claim | None:
-        """others: people who seek the robot's eyes in vain now, for it attends to somebody else."""
+    def claim(self, now: Seconds, weaker: Sequence[Claim]) -> Claim | None:
         self._seen = now
+        # Who seeks the robot's eyes while it attends to somebody else seeks them in vain.
+        others = {*self.scene.sight.present(now)} - {*self.scene.drawing(now)}
         for id in [id for id, answer in self._open.items() if answer.until is not None and now >= answer.until]:
             del self._open[id]
         for answer in reversed(self._open.values()):
@@ -90,12 +94,7 @@ class ResponsePolicy:
                 continue
             index = sum(now >= turn for turn in self._turns(answer))
             kind = EVENT_KINDS[answer.event.kind].title
-            return Claim(
-                kind="response",
-                priority=4,
-                target=answer.targets[index],
-                reason=f"{kind} of {answer.event.initiator}",
-            )
+            return self.wish(answer.targets[index], f"{kind} of {answer.event.initiator}")
         return None
 
     def _turns(self, answer: _Answer) -> list[Seconds]:

@@ -1,0 +1,186 @@
+"""Policies of the head are a list: others add theirs in their place, and can be done without."""
+
+import asyncio
+from collections.abc import Callable, Sequence
+
+import pytest
+
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.fragments import Claim
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.head.arbiter import Arbiter
+from engage_hri.services.generation.head.maintenance_policy import FaceWatch
+from engage_hri.services.generation.head.policies import OWN, arranged
+from engage_hri.services.generation.head.policy import HeadPolicy
+from engage_hri.services.generation.head.scene import Observation
+from tests.control.test_offers import install as install
+from tests.generation.heads import INHIBITED, Stage, on_the_face, world
+from tests.generation.partners import stage
+
+Install = Callable[..., None]
+
+
+class Piece(HeadPolicy):
+    """Claims the piece from 20 s to 25 s."""
+
+    before = "glance"
+    FROM, TO = 20.0, 25.0
+
+    @property
+    def deadline(self) -> Seconds | None:
+        return next((at for at in (self.FROM, self.TO) if at > self.asked_at), None)
+
+    asked_at = 0.0
+
+    def claim(self, now: Seconds, weaker: Sequence[Claim]) -> Claim | None:
+        self.asked_at = now
+        return self.wish("piece", "its time") if self.FROM <= now < self.TO else None
+
+
+class FacesElsewhere(FaceWatch):
+    """Stands for ours, by its name."""
+
+    def claim(self, now: Seconds, weaker: Sequence[Claim]) -> Claim | None:
+        return self.wish("other", "shy")
+
+
+class Breaks(HeadPolicy):
+    def __init__(self, *given: object) -> None:
+        super().__init__(*given)  # type: ignore[arg-type]
+        self.calls = 0
+
+    def feed(self, message: Observation, now: Seconds) -> None:
+        self.calls += 1
+        if self.calls == 2:
+            raise ZeroDivisionError("a second message")
+
+
+def staged(**policies: type[HeadPolicy]) -> Stage:
+    with_others = Stage()
+    with_others.arbiter = Arbiter("robot", GenerationConfig(), policies)
+    with_others.feed(world())
+    return with_others
+
+
+def test_priorities_are_counted_from_the_order_one_for_each_kind() -> None:
+    alone = Arbiter("robot", GenerationConfig())
+
+    assert {policy.name: policy.priority for policy in alone._policies} == {
+        "inhibition": 1, "fragment": 2, "glance": 3, "response": 4, "listening": 4, "hands": 5, "face": 6,
+    }  # fmt: skip
+
+
+def test_a_policy_of_others_gets_the_head_in_its_place_and_only_then() -> None:
+    with_piece = staged(piece=Piece)
+    with_piece.until(22.0)
+    assert with_piece.owners[-1] == (20.0, "piece", "piece")
+    assert with_piece.rulings[-1].owner.priority == 3
+    assert [claim.priority for claim in with_piece.rulings[-1].waiting if claim.kind == "face"] == [7]
+
+    with_piece.do(lambda arbiter: arbiter.fragment_gazes("other"))
+    assert with_piece.owner == "fragment"
+    with_piece.do(lambda arbiter: arbiter.fragment_lets_go())
+    with_piece.until(25.1)
+    assert with_piece.owner == "piece"  # the head dwells
+    with_piece.until(26.0)
+    assert with_piece.owner == "face"
+
+
+def test_a_policy_of_others_may_stand_for_one_of_ours() -> None:
+    shy = staged(face=FacesElsewhere)
+
+    assert shy.owners == [(0.0, "face", "other")]
+
+
+def test_one_that_raises_is_dropped_and_noted_and_the_head_goes_on() -> None:
+    breaking = staged(breaks=Breaks, piece=Piece)
+    breaking.feed(world(), world())
+
+    assert [(name, str(error)) for name, error in breaking.arbiter.mistakes] == [("breaks", "a second message")]
+    breaking.until(21.0)
+    assert breaking.owner == "piece"
+
+
+def test_a_mistake_of_ours_is_raised(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*given: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(FaceWatch, "claim", fails)
+    with pytest.raises(ZeroDivisionError):
+        Stage().feed(world())
+
+
+@pytest.mark.parametrize("off", ["glance", "response", "listening", "hands", "face"])
+def test_each_can_be_off(off: str) -> None:
+    assert [*arranged(GenerationConfig(policies_off=(off,)), {})] == [name for name in OWN if name != off]
+
+
+def test_without_glances_nothing_disturbs_the_hands() -> None:
+    seen = []
+    for off in ((), ("glance",)):
+        still = on_the_face(policies_off=off)  # type: ignore[arg-type]
+        still.feed(world(speed=1.0))
+        still.until(60.0)
+        seen.append("glance" in [kind for _, kind, _ in still.owners])
+
+    assert seen == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("off", "others", "told"),
+    [
+        (("glanse",), {}, "no policy 'glanse'"),
+        (("fragment",), {}, "somebody has ordered"),
+        ((), {"late": type("Late", (HeadPolicy,), {"before": "hamds"})}, "is to come before 'hamds'"),
+    ],
+)
+def test_what_cannot_be_arranged_is_refused(
+    off: tuple[str, ...], others: dict[str, type[HeadPolicy]], told: str
+) -> None:
+    with pytest.raises(InputRefused, match=told):
+        arranged(GenerationConfig(policies_off=off), others)
+
+
+def test_an_inhibition_is_above_a_policy_of_others() -> None:
+    with_piece = staged(piece=Piece)
+    with_piece.until(21.0)
+    with_piece.do(lambda arbiter: arbiter.inhibit(INHIBITED))
+
+    assert with_piece.owner == "inhibition"
+
+
+DOOR = """
+from engage_hri import HeadPolicy
+
+class Middle(HeadPolicy):
+    before = "glance"
+
+    def claim(self, now, weaker):
+        return self.wish("middle", "always")
+
+class Breaking(HeadPolicy):
+    def claim(self, now, weaker):
+        raise LookupError("lost")
+"""
+
+
+async def test_a_policy_of_an_installed_package_turns_the_head(hub: MemoryHub, install: Install) -> None:
+    install("acme-manners", "[engage.head_policies]\nmiddle = acme_manners:Middle\n", acme_manners=DOOR)
+    async with stage(hub) as partners:
+        await asyncio.sleep(0.1)
+
+        assert [(each.owner.kind, each.owner.target) for each in partners.owners] == [("middle", "middle")]
+
+
+@pytest.mark.contained
+async def test_one_that_breaks_is_a_fault_and_the_robot_looks_at_people_all_the_same(
+    hub: MemoryHub, install: Install
+) -> None:
+    install("acme-manners", "[engage.head_policies]\nlost = acme_manners:Breaking\n", acme_manners=DOOR)
+    async with stage(hub) as partners:
+        await asyncio.sleep(0.1)
+
+        assert [(each.owner.kind, each.owner.target) for each in partners.owners] == [("face", "human")]
+        assert any("policy 'lost'" in str(each) for each in partners.faults)
