@@ -4,7 +4,7 @@ import pytest
 
 from engage_hri.schemas.behaviors import Gaze, Gesture, Pointing, Speech
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.fragments import Claim, Inhibit
+from engage_hri.schemas.fragments import Inhibit
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.inhibitions import Inhibition, Leases, Permits
 
@@ -29,10 +29,9 @@ def test_the_newest_lease_on_gaze_claims_the_head() -> None:
     leases.take(lease("b", mode="target", target="table"))
     leases.take(lease("c", part="point-left"))
 
-    claim = Claim(kind="inhibition", priority=1, target="table", reason="manager: target")
-    assert leases.inhibition == Inhibition(claim, "target")
+    assert leases.inhibition == Inhibition("table", "manager: target", "target")
     assert leases.release("b")
-    assert leases.inhibition == Inhibition(Claim(kind="inhibition", priority=1, reason="manager: hold"), "hold")
+    assert leases.inhibition == Inhibition("", "manager: hold", "hold")
     assert not leases.release("b")
 
 
@@ -82,7 +81,7 @@ def test_degraded_generation_is_a_standing_inhibition_of_everything_but_words() 
     permits = leases.permits()
 
     assert leases.inhibition is not None
-    assert (leases.inhibition.claim.kind, leases.inhibition.mode) == ("inhibition", "stare")
+    assert leases.inhibition.mode == "stare"
     assert permits.allows(Speech(id="s", text="hello"))
     assert not permits.allows(Gaze(id="g", target="x"))
     assert not permits.allows(Gesture(id="b", lexeme="beat"))

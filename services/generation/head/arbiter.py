@@ -1,12 +1,12 @@
 """Arbiter of the robot's head: claims by priority, one owner at a time. Thesis 3.3.4.
 
 The claims are those of the policies, in the order of `policies.py`. A higher claim takes over at once; when the
-owner lets go the head stays for a dwell before a lower claim gets it. From a face that it has just gone to it goes to
-another one by a higher claim than those of the people (response, face) only. Policies move the base gaze by
-`gazeShift` blocks, which end on arrival and hold nothing. A fragment's own gaze lies over the base gaze: while it owns
-the head no shift is sent, with two exceptions. While that gaze is on a face the base gaze goes there, too, unseen: at
-the end of a turn the head must not fall back to where it was before. And when an inhibition that holds the head has
-that gaze aborted, the base gaze goes to its target: else the head would go home.
+owner lets go the head stays for a dwell before a lower claim gets it. From a face that it has just gone to it goes
+to another one by a higher claim than those of the people (response, face) only. Policies move the base gaze by
+`gazeShift` blocks, which end on arrival and hold nothing. A fragment's own gaze lies over the base gaze: while it
+owns the head no shift is sent, with two exceptions. While that gaze is on a face the base gaze goes there, too,
+unseen: at the end of a turn the head must not fall back to where it was before. And when an inhibition that holds
+the head has that gaze aborted, the base gaze goes to its target: else the head would go home.
 """
 
 from collections.abc import Callable, Mapping
