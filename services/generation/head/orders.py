@@ -1,4 +1,4 @@
-"""What others have ordered: an inhibition in force, and the gaze of a fragment. Their claims come first. Pure."""
+"""Orders of others: an inhibition in force, and the gaze of a fragment. Their claims come first. Pure."""
 
 from collections.abc import Sequence
 

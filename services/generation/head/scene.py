@@ -1,4 +1,4 @@
-"""What all policies of the head know: who is in sight, to whom the robot speaks, and who is to answer it. Pure."""
+"""Knowledge that all policies of the head share: who is in sight, whom the robot spoke to, who is to answer it. Pure."""
 
 import math
 from itertools import takewhile
