@@ -1,4 +1,4 @@
-"""Knowledge that all policies of the head share: who is in sight, whom the robot spoke to, who is to answer it. Pure."""
+"""Knowledge that all policies of the head share: who is in sight, and who was spoken to or is to answer. Pure."""
 
 import math
 from itertools import takewhile
