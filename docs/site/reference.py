@@ -36,11 +36,13 @@ SECTIONS = {
         "SetPointBody", "SimulatedServos", "OrdinaryBody", "Body", "MovementAuthority", "Arrived", "Reached",
         "JointLimit", "Ray",
     ),
+    "Writing a policy of the head": ("HeadPolicy",),
     "What goes wrong": (
         "EngageError", "InputRefused", "RunFailed", "PerformFailed", "RequestRefused", "BehaviorRefused", "Fault",
     ),
 }  # fmt: skip
 BESIDE = {
+    "Writing a policy of the head": ("services.generation.head.scene.HeadScene", "schemas.fragments.Claim"),
     "Driving a robot": ("services.client.feeds.Feed", "services.client.feeds.EventFeed"),
     "What comes back": ("schemas.blocks.BlockOutcome", "schemas.recognition.OpenEvents"),
     "Writing a body": (

@@ -62,6 +62,7 @@ ELSEWHERE = {
     ("docs/recognition.md", "diff"): "tests/recognition/test_new_kind.py",
     ("docs/bus.md", "mermaid"): "tests/requests/test_request_model.py",
     ("docs/reachy-mini.md", "sh"): "tests/control/reachy_mini/test_docs.py",
+    ("docs/generation.md", "python"): "tests/generation/test_head_policies.py",
     ("docs/hearing.md", "sh"): "tests/perception/test_hearing_page.py",
     ("docs/hearing.md", "python"): "tests/perception/test_hearing_page.py",
     ("docs/eyes.md", "sh"): "tests/perception/eyes/test_eyes_page.py",

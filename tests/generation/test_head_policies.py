@@ -1,13 +1,17 @@
 """Policies of the head are a list: others add theirs in their place, and can be done without."""
 
 import asyncio
+import re
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.fragments import Claim
 from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import Entity
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.head.arbiter import Arbiter
@@ -149,6 +153,20 @@ def test_an_inhibition_is_above_a_policy_of_others() -> None:
     with_piece.do(lambda arbiter: arbiter.inhibit(INHIBITED))
 
     assert with_piece.owner == "inhibition"
+
+
+def test_the_policy_of_the_page_is_one() -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "generation.md").read_text(encoding="utf-8")
+    [code] = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    names: dict[str, type] = {}
+    exec(code, names)
+    looks = staged(door=names["Door"])
+    seen = world()
+    for features, owner in ((("open",), "door"), ((), "face")):
+        door = Entity(id="door", kind="object", position=(2.0, 1.0, 1.0), features=features)
+        looks.feed(replace(seen, entities=(*seen.entities, door)))
+        looks.until(looks.now + 1.0)
+        assert looks.owner == owner
 
 
 DOOR = """
