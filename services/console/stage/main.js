@@ -194,6 +194,7 @@ function tick() {
   const next = visit(now - idle, { seated: Boolean(state.person), kiosk: isKiosk, touched });
   if (next.do === "anew") {
     touched = false;
+    link.end();
     location.replace(`${location.pathname}?kiosk`);
     return;
   }

@@ -32,7 +32,7 @@ from engage_hri.services.console.web.frames import Outbox, Receipts, Viewer, You
 from engage_hri.services.console.web.guard import App, Guarded, Hosts
 from engage_hri.services.console.web.played import PlayedPicture
 from engage_hri.services.console.web.service import WindowServer
-from engage_hri.services.console.web.sessions import CLOSED, PageSession, Sessions
+from engage_hri.services.console.web.sessions import OVER, PageSession, Sessions
 from engage_hri.services.console.web.sounds import Sounds
 from engage_hri.services.console.web.stage import StageFace
 from engage_hri.services.console.web.visitor import Visitor
@@ -244,7 +244,7 @@ async def _shown(browser: WebSocket, sessions: Sessions, trusted: bool) -> None:
     if session is None:
         await browser.close(FULL, WORDS_FULL)
         return
-    link, code = session.links, CLOSED[0]
+    link, code = session.links, OVER
     try:
         await _show(browser, session)
     except WebSocketDisconnect as end:
