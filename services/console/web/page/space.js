@@ -9,6 +9,8 @@ const VIEWS = {
   "as the person sees it": [[1.55, 0, 1.38], [0.3, 0, 0.85]],
   "as the robot sees it": [[-0.55, 0.25, 1.75], [0.75, 0, 0.7]],
 };
+const UPRIGHT = 42; // degrees that the camera sees at least, upright
+const ACROSS = 0.68; // tangent of half of what it sees at least from left to right: the floor is whole
 
 export function space(panel, order) {
   const place = panel.querySelector(".space");
@@ -36,7 +38,7 @@ export function space(panel, order) {
     renderer.setSize(width, height);
     labels.setSize(width, height);
     camera.aspect = width / height;
-    camera.fov = width / height < 1.2 ? 55 : 42;
+    camera.fov = Math.max(UPRIGHT, (2 * Math.atan(ACROSS / camera.aspect) * 180) / Math.PI);
     camera.updateProjectionMatrix();
     stale = true;
   }).observe(place);
