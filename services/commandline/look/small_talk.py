@@ -70,8 +70,9 @@ SILENCE = (
 )
 WORDS = 10.0
 """Seconds for which the robot waits for words of somebody whose voice it hears."""
-LISTENS = 1.5
-"""Seconds for which somebody has spoken when the robot nods, to say that it listens."""
+LISTENS = 2.5
+"""Seconds for which somebody has spoken when the robot nods, to say that it listens: no phrase of ours is so long, and
+its answer would wait for the end of the nod."""
 PHRASES = (
     *(phrase for phrases in RULES for phrase in phrases),
     *(f"where is the {piece}" for piece in PIECES if piece != "blue square"),
@@ -109,7 +110,7 @@ async def talk_with(robot: Robot, person: str, floor: asyncio.Lock) -> None:
                 said = await utterances.next(seconds)
                 if said is None and nods_at is not None:
                     nods_at = None
-                    if not floor.locked():  # the answer does not wait for the nod
+                    if not floor.locked():
                         nods.create_task(perform(robot, person, "backchannel", parts_of("[nod]")))
                     continue
                 if said is None and not speaks:

@@ -10,7 +10,8 @@ const VIEWS = {
   "as the robot sees it": [[-0.55, 0.25, 1.75], [0.75, 0, 0.7]],
 };
 const UPRIGHT = 42; // degrees that the camera sees at least, upright
-const ACROSS = 0.68; // tangent of half of what it sees at least from left to right: the floor is whole
+const ACROSS = 0.46; // tangent of half of what it sees at least from left to right: the floor is whole there
+const FLOOR = 1.0; // metres from its middle to its edge: robot and people stand on it
 
 export function space(panel, order) {
   const place = panel.querySelector(".space");
@@ -123,8 +124,8 @@ function furniture(scene) {
   const sky = new THREE.HemisphereLight("#ffffff", "#8b8577", 2.1);
   const lamp = new THREE.DirectionalLight("#fff4e2", 1.6);
   lamp.position.set(1.2, 1.6, 3.2);
-  const floor = new THREE.Mesh(new THREE.CircleGeometry(1.45, 64), material("#cfd6d8"));
-  floor.position.x = 0.6; // below the table, and whole in each view
+  const floor = new THREE.Mesh(new THREE.CircleGeometry(FLOOR, 64), material("#cfd6d8"));
+  floor.position.x = 0.6; // below the table
   scene.add(sky, lamp, floor);
   return {
     theme(dark) {
