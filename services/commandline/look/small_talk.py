@@ -71,8 +71,8 @@ SILENCE = (
 WORDS = 10.0
 """Seconds for which the robot waits for words of somebody whose voice it hears."""
 LISTENS = 2.5
-"""Seconds for which somebody has spoken when the robot nods, to say that it listens: no phrase of ours is so long, and
-its answer would wait for the end of the nod."""
+"""Seconds for which somebody has spoken when the robot nods, to say that it listens: no phrase of ours is so long,
+and its answer would wait for the end of the nod."""
 PHRASES = (
     *(phrase for phrases in RULES for phrase in phrases),
     *(f"where is the {piece}" for piece in PIECES if piece != "blue square"),
