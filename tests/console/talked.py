@@ -35,8 +35,8 @@ PERSON = "window.stage.state.person"
 READY = "window.stage?.state.scene?.body && !document.querySelector('.sit').getAttribute('aria-disabled')"
 SAID = (
     "i am fine", *(each for each in EXAMPLES if "white" not in each), "do you hear me", "how are you",
-    "where is the blue square", "the blue one", "make me laugh", "i like you", "no thank you", "tell me a joke",
-    "i am tired", "what are these", "the red one", "thank you very much", "i have to go now",
+    "where is the blue square", "make me laugh", "the red one", "i like you", "no thank you", "the blue one",
+    "tell me a joke", "i am tired", "what are these", "thank you very much", "i have to go now",
 )  # fmt: skip
 """What the visitor says, one after the other: they answer the greeting, and say what the robot says that one may.
 
