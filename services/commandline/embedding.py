@@ -6,6 +6,7 @@ async with embedded(human="listening") as robot:
         await ben.say("Hello, robot.")
 """
 
+import asyncio
 from collections.abc import AsyncIterator, Iterable, Mapping
 from contextlib import asynccontextmanager, nullcontext
 from pathlib import Path
@@ -87,18 +88,25 @@ async def in_memory(config: RobotConfig, services: Mapping[str, Service]) -> Asy
         raise group.exceptions[0] from None
 
 
-async def play_tangram(
+async def play_tangram(config: RobotConfig, sinks: Iterable[Sink]) -> None:
+    """Run all services until the task is over. sinks: get all messages, with instants of this loop."""
+    async with tangram(config, sinks) as over:
+        await over.wait()
+
+
+@asynccontextmanager
+async def tangram(
     config: RobotConfig,
     sinks: Iterable[Sink],
     hub: Hub | None = None,
     record: Path | None = None,
     *,
     hears: bool = False,
-) -> None:
-    """Run all services until the task is over. sinks: get all messages, with instants of this loop.
+) -> AsyncIterator[asyncio.Event]:
+    """Run all services: the body of `async with` begins once they stand. Yields an event: the task is over.
 
-    hub: the bus on which they run, for others to look on; None: one in memory. record: a file for all that is said.
-    hears: hearing runs as well.
+    sinks: get all messages, with instants of this loop. hub: the bus on which they run, for others to look on; None:
+    one in memory. record: a file for all that is said. hears: hearing runs as well.
     """
     async with MemoryHub(config.robot, decodes=False) if hub is None else nullcontext(hub) as hub:
         bound = services(config, *roster.PLAY, *(("hearing",) if hears else ()))
@@ -106,6 +114,6 @@ async def play_tangram(
         bus = hub.join("console")
         try:
             async with kept, following(bus, sinks), running(hub, bound) as over:
-                await over.wait()
+                yield over
         finally:
             await bus.leave()

@@ -162,3 +162,15 @@ def test_visitors_hear_the_voice_at_their_page_and_no_sound_card_is_needed(
 
     assert config.hearing.source == "page"
     assert player.found(EspeakSettings(**config.control.drivers["espeak"])) is None
+
+
+@pytest.mark.parametrize("seat", ["--you", "--kiosk"])
+@pytest.mark.parametrize("wrong", [("--voice", "nosuch"), ("--body", "nosuch")])
+def test_what_cannot_be_is_refused_before_an_address_is_told(
+    engage: Engage, seat: str, wrong: tuple[str, ...]
+) -> None:
+    pytest.importorskip("starlette", reason="needs the extra `console`")
+
+    refused = engage("demo", seat, "--port", "0", *wrong)
+
+    assert (refused.code, "'nosuch'" in refused.err, "http" in refused.out + refused.err) == (2, True, False)

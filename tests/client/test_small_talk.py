@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 
 from engage_hri import embedded, perceive
+from engage_hri.schemas import keys
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.services.commandline.embedding import EmbeddedRobot
 from engage_hri.services.commandline.look.small_talk import (
     EXAMPLES,
@@ -24,6 +26,11 @@ from engage_hri.services.commandline.look.small_talk import (
 from engage_hri.services.commandline.look.talk import RULES as RULES_FILE
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "talk.md").read_text(encoding="utf-8")
+
+
+def spoken(text: str) -> str:
+    """The words of an answer, without what the head does meanwhile."""
+    return re.sub(r"\[(nod|shake|look \w+)\] ?", "", text)
 
 
 class Talk:
@@ -61,7 +68,7 @@ async def test_who_comes_is_greeted_answered_and_told_goodbye() -> None:
             await asyncio.sleep(6)
         await asyncio.sleep(60)
 
-    greeting = SILENCE[0][1]
+    greeting = spoken(SILENCE[0][1])
     assert going.turns == [
         greeting.removesuffix(" How are you?"), "How are you?", "Hello!", "How are you?", "I am glad to hear that.",
         "Here is the blue square", "Goodbye! It was nice to talk with you.",
@@ -75,6 +82,27 @@ async def test_who_speaks_first_is_answered_and_not_greeted() -> None:
         await asyncio.sleep(5)
 
     assert going.turns == ["I began a few minutes ago."]
+
+
+async def test_its_head_says_that_it_listens_looks_at_what_it_speaks_of_and_back_at_the_end() -> None:
+    async with talking() as going, perceive("ann", hub=going.robot.hub) as ann:
+        bus = going.robot.hub.join("watch")
+        with bus.subscribe(keys.ROBOT_ACTION) as actions:
+            await ann.look_at(ann.robot)
+            await asyncio.sleep(6)
+            asked = asyncio.get_running_loop().time()
+            await ann.say("I have come from far away, and I would like to know: what is on the table?")
+            answered = asyncio.get_running_loop().time()
+            await asyncio.sleep(6)
+            began = [
+                (bus.local(told.message.at), told.message.action, *told.message.targets)
+                for told in [await anext(actions) for _ in range(actions.waiting)]
+                if isinstance(told.message, ActionBegan) and told.message.action != "speak"
+            ]
+        await bus.leave()
+
+    assert [each[1:] for each in began if each[0] > asked] == [("nod",), ("look", "table"), ("look", "ann")]
+    assert asked + 1.0 < next(at for at, *_ in began if at > asked) < answered
 
 
 async def test_who_says_nothing_is_offered_help_and_then_left_in_peace() -> None:
@@ -96,7 +124,7 @@ async def test_each_of_two_is_answered_and_who_has_gone_is_not() -> None:
             await asyncio.sleep(12)
         await asyncio.sleep(5)
 
-    assert going.turns[-2:] == [answer("i like you"), answer("tell me a joke")]
+    assert going.turns[-2:] == [spoken(answer("i like you")), spoken(answer("tell me a joke"))]
 
 
 async def test_who_wants_help_hears_each_time_other_examples_and_may_ask_for_any_piece() -> None:
@@ -135,7 +163,7 @@ async def test_what_it_does_not_know_it_says_and_names_another_example_each_time
             await ann.say(words)
             await asyncio.sleep(12)
 
-    before, after = OTHERWISE.split("{example}")
+    before, after = spoken(OTHERWISE).split("{example}")
     named = [turn.removeprefix(before).removesuffix(after) for turn in going.turns[2:]]
     assert (len({*named}), {*named} - {*EXAMPLES}) == (2, set())
 

@@ -72,7 +72,7 @@ def main() -> None:
     """Run a robot, its window and a browser, and take the pictures."""
     FOLDER.mkdir(exist_ok=True)
     endpoint = free_endpoint()
-    with tempfile.TemporaryDirectory() as name:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:  # a browser that ends still writes
         folder = Path(name)
         up = ("up", "--task", "--in-one", "--listen", endpoint)
         console = ("console", "--connect", endpoint, "--port", "0", "--role", "wizard")

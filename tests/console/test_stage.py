@@ -4,7 +4,7 @@ import asyncio
 import importlib.util
 import json
 from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import aiohttp
 import pytest
 
+from engage_hri import connect, perceive
 from engage_hri.services.bus.zenoh.hub import open_hub
 from tests.bus.places import free_endpoint
 from tests.console import browser
@@ -107,6 +108,10 @@ async def opened(place: Place, more: str = "", language: str = "en-US") -> Async
         await page.go(place.stage + more)
         await shows(page)
         yield page
+        await page.value(
+            f"{PERSON} && window.stage.send({{ do: 'leave' }});0"
+        )  # the seat of a page that goes stays for a while
+        await page.until(f"!{PERSON}")
         strangers = [each for each in page.requests if not each.startswith("data:") and "127.0.0.1" not in each]
         assert page.errors == []
         assert strangers == []
@@ -300,6 +305,23 @@ async def test_a_kiosk_asks_who_does_nothing_and_begins_anew_for_the_next(place:
 
 
 @needs_browser
+async def test_who_loads_the_page_anew_has_seat_and_name_again_and_a_second_tab_has_not(place: Place) -> None:
+    async with opened(place) as page:
+        own = await sit(page)
+        await page.value("void (window.isOld = true)")
+
+        await page.call("Page.reload")
+        await page.until(f"!window.isOld && {PERSON}", 30)
+        async with opened(place) as other:
+            assert await other.value(PERSON) == ""
+            assert await other.value("window.stage.state.scene.people.filter((each) => each.present).length") == 1
+            assert await sit(other) != own
+            assert await page.value(PERSON) == own
+
+        assert await page.value("sessionStorage.length") == 0
+
+
+@needs_browser
 async def test_what_a_visitor_has_said_is_read_out_to_them_and_not_to_the_next(place: Place) -> None:
     read = "document.querySelector('.read').textContent"
     async with opened(place) as page:
@@ -339,6 +361,7 @@ async def test_what_becomes_of_who_does_nothing_and_what_a_visitor_is_told_first
         cases = {
             talk(): "", talk((), pair): "looking", talk(says, pair): "listen", talk(says, look): "about",
             talk((), look, pair): "looking", talk((), eyes): "meet", talk((), {**eyes, "met": True}): "mutual",
+            talk([{"actor": "robot", "to": ["ben"]}], eyes): "elsewhere", talk([{"actor": "ben", "to": []}]): "",
             talk((), {**pair, "to": "ben"}): "", talk((), {**pair, "met": True}): "",
         }  # fmt: skip
         assert {case: await page.value(seen % case) for case in cases} == cases
@@ -381,6 +404,46 @@ async def test_two_visitors_see_the_table_each_from_their_own_place_and_are_call
                 ["Auch hinsetzen", "Andere sind schon hier."],
             ],
         ]
+
+
+@needs_browser
+async def test_a_third_visitor_reads_each_name_and_to_whom_the_robot_speaks(place: Place) -> None:
+    rects = """[...document.querySelectorAll('.heads .name')].map((each) => each.getBoundingClientRect())
+      .map(({ left, top, right, bottom }) => [left, top, right, bottom])"""
+    hint = "document.querySelector('.hint').textContent"
+    async with await open_hub("robot", connect=(place.endpoint,)) as hub, AsyncExitStack() as company:
+        for name in ("ann", "ben"):
+            await company.enter_async_context(perceive(name, hub=hub))
+        async with opened(place) as page, connect(hub=hub, name="manager") as robot:
+            await sit(page)
+            for width, height in (PHONE, (844, 390), (1366, 768)):
+                await page.look(width, height)
+                await page.until(f"window.stage.box.width === {width} && window.stage.shown.isStill")
+                await page.until("document.querySelectorAll('.heads .name').length === 2")
+                one, other = await page.value(rects)
+                assert one[0] >= other[2] or other[0] >= one[2] or one[1] >= other[3] or other[1] >= one[3]
+            turn = {"turn_status": "full", "parts": [{"say": "Do you know what this is, and where it comes from?"}]}
+            saying = asyncio.create_task(robot.perform(turn, addressee="ben"))
+            await page.until(f"{hint} === 'The robot is speaking to ben.'", 20)
+            await saying
+
+
+@needs_browser
+async def test_what_one_can_say_is_said_at_a_touch(tmp_path: Path, place: Place) -> None:
+    said = "[...document.querySelectorAll('.bubble.you span')].map((each) => each.textContent).join('')"
+    sizes = "[...document.querySelectorAll('.saying')].map((each) => each.getBoundingClientRect().height)"
+    phrases = '["where is the cup", "thank you"]'
+    console = ("console", "--connect", place.endpoint, "--port", "0", "--role", "wizard")
+    with engage(tmp_path / "console", *console, "--set", f"hearing.phrases={phrases}") as window:
+        url = waited(window, tmp_path / "console", STAGE)
+        async with opened(place._replace(stage=url)) as page:
+            await sit(page)
+            assert all(height >= 44 for height in await page.value(sizes))
+            await press(page, ".saying")
+            await page.until(f"{said}.includes('where is the cup')")
+            assert await page.value(SCROLLS) == 0
+    async with opened(place) as page:  # nobody knows what one can say
+        assert await page.value("document.querySelector('.sayings').hidden")
 
 
 @needs_browser

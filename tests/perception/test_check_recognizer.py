@@ -8,7 +8,7 @@ import pytest
 
 from tests.cli.command import Engage
 from tests.cli.command import engage as command
-from tests.perception.spoken import PHRASES, spoken, write_wav
+from tests.perception.spoken import PHRASES, spoken, voice, write_wav
 
 
 @pytest.fixture
@@ -64,6 +64,17 @@ def test_known_phrases_are_understood_by_the_one_that_needs_no_model(engage: Eng
 
     done = engage("check-recognizer", "sphinx", files, "--set", f"hearing.phrases={json.dumps(PHRASES)}")
     assert "1.wav: 'the blue one' 33% wrong" in done.out
+
+
+def test_a_file_that_begins_with_the_voice_is_heard_as_after_silence(engage: Engage, tmp_path: Path):
+    pytest.importorskip("pocketsphinx", reason="pip install pocketsphinx")
+    write_wav(tmp_path / "1.wav", voice("how old are you"))
+    (tmp_path / "1.txt").write_text("How old are you?")
+
+    phrases = json.dumps([*PHRASES, "how old are you", "where is the pink triangle"])
+    done = engage("check-recognizer", "sphinx", tmp_path, "--set", f"hearing.phrases={phrases}")
+
+    assert "1.wav: 'how old are you' right" in done.out
 
 
 def test_what_is_missing_is_told(engage: Engage, files: Path):

@@ -81,7 +81,8 @@ async def _show(options: Options, config: RobotConfig, things: tuple[Thing, ...]
             complain(f"the window has the role {bus.role}, that of its keys, and not --role {options.role}")
         async with window(hub, bus, Script(things), keyed=bool(config.bus.keys)) as shown:
             bus.declare_alive()
-            app = server.application(shown, hosts(options), token, config.hearing.language, options.pages)
+            spoken = config.hearing
+            app = server.application(shown, hosts(options), token, spoken.language, spoken.phrases, options.pages)
             pages = {workshop_page(token if bus.role in RIGHTS else ""): ""}
             if "seat" in RIGHTS.get(bus.role, ()):
                 pages[stage_page(token)] = "the stage, for visitors: "

@@ -1,12 +1,12 @@
 """Command `engage demo`: the whole system in this process plays the anchor tangram with a simulated person."""
 
 import asyncio
-from collections.abc import Callable, Coroutine
-from contextlib import nullcontext
+from collections.abc import Callable
+from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -14,8 +14,8 @@ from rich.console import Console
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.commandline.embedding import play_tangram
-from engage_hri.services.commandline.look.window import can_open, seat_refusal, web, windowed
+from engage_hri.services.commandline.embedding import tangram
+from engage_hri.services.commandline.look.window import can_open, looking_on, seat_refusal, web, windowed
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.options import Embodied, Kiosk, Shown, Simulated, VirtualTime, Written
 from engage_hri.services.commandline.shell.outputs import Outputs
@@ -121,32 +121,45 @@ async def demonstrate(
     began = asyncio.get_running_loop().time()
     tallying = Tallying(began)
     tell = partial(console.print, highlight=False, markup=False)
+    hears = options.is_for_visitors and config.control.has_voice and has_hearing()
     async with MemoryHub(config.robot, decodes=False) as hub:
-        beside = (
-            windowed(hub, options, began, tell, language=config.hearing.language, kiosk=options.kiosk)
-            if window
-            else nullcontext()
-        )
         with scene_view(console, config.robot, began, live) as show:
-            async with beside as shown:
-                hears = options.is_for_visitors and config.control.has_voice and has_hearing()
-                play = partial(play_tangram, config, (show, tallying, outputs), hub, options.record, hears=hears)
-                await (_again_and_again(play, shown) if options.kiosk and shown else play())
+            play = partial(tangram, config, (show, tallying, outputs), hub, options.record, hears=hears)
+            if not window:
+                async with play() as over:
+                    await over.wait()
+                return tallying.tally
+            async with looking_on(hub, began) as shown:
+                spoken = config.hearing
+                page = windowed(
+                    shown, options, tell, language=spoken.language, examples=spoken.phrases, kiosk=options.kiosk
+                )
+                await _shown(play, page, shown, again=options.kiosk)
     return tallying.tally
 
 
-async def _again_and_again(play: Callable[[], Coroutine[Any, Any, None]], shown: "WindowServer") -> None:
-    """Play for one visitor after another, until cancelled: anew when the task is over, or its visitor has left."""
-    while True:
-        playing, leaving = asyncio.create_task(play()), asyncio.create_task(_left(shown))
-        try:
-            await asyncio.wait((playing, leaving), return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            playing.cancel()
-            leaving.cancel()
-            await asyncio.wait((playing, leaving))
-        if not playing.cancelled():
-            playing.result()
+async def _shown(
+    play: Callable[[], AbstractAsyncContextManager[asyncio.Event]],
+    page: AbstractAsyncContextManager[None],
+    shown: "WindowServer",
+    *,
+    again: bool,
+) -> None:
+    """Play in a window. again: anew when the task is over, or its visitor has left, until cancelled."""
+    async with AsyncExitStack() as stays:
+        is_open = False
+        while again or not is_open:
+            async with play() as over:
+                if not is_open:  # nothing was refused
+                    await stays.enter_async_context(page)
+                    is_open = True
+                ends = [asyncio.create_task(over.wait()), *([asyncio.create_task(_left(shown))] if again else [])]
+                try:
+                    await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
+                finally:
+                    for each in ends:
+                        each.cancel()
+                    await asyncio.wait(ends)
 
 
 async def _left(shown: "WindowServer") -> None:

@@ -13,9 +13,16 @@ from typing import Literal
 from engage_hri import EngageError, Entity, Robot, connect
 
 RULES = {
-    # what somebody says, in any of these forms, and what the robot answers; a thing in brackets it shows
-    ("hello robot", "hello", "good morning"): "Hello! How are you?",
-    ("i am fine", "i am good", "fine thank you", "fine thanks", "very well thank you"): "I am glad to hear that.",
+    # what somebody says, in any of these forms, and what the robot answers. In brackets: a thing that it shows, a
+    # thing that it looks at, or what its head does meanwhile
+    ("hello robot", "hello", "good morning"): "[nod] Hello! How are you?",
+    (
+        "i am fine",
+        "i am good",
+        "fine thank you",
+        "fine thanks",
+        "very well thank you",
+    ): "[nod] I am glad to hear that.",
     ("i am tired", "not so good"): "I am sorry. Stay with me for a while.",
     ("how are you", "are you well"): "I am well, thank you.",
     ("what is your name", "who are you"): "I am a robot, and I have no name yet.",
@@ -25,16 +32,19 @@ RULES = {
         "what can i say",
         "please help me",
     ): "I listen, I look, and I point. You can say: {examples}.",
-    ("yes", "yes please"): "Then say, for example: {examples}.",
-    ("no", "no thank you"): "As you like.",
-    ("can you hear me", "do you hear me"): "I hear you well.",
-    ("what is on the table", "what are these"): "These are the pieces of a puzzle. Which one do you like?",
+    ("yes", "yes please"): "[nod] Then say, for example: {examples}.",
+    ("no", "no thank you"): "[nod] As you like.",
+    ("can you hear me", "do you hear me"): "[nod] I hear you well.",
+    (
+        "what is on the table",
+        "what are these",
+    ): "[look table] These are the pieces of a puzzle. Which one do you like?",
     ("the blue one", "where is the blue square"): "Here is [blue-square].",
     ("the red one", "show me the red square"): "Here is [red-square].",
     ("tell me a joke", "make me laugh"): "What does a robot do at lunch? It has a megabyte.",
-    ("i like you",): "That is kind of you. I like to look at you, too.",
-    ("thank you", "thank you very much"): "You are welcome.",
-    ("goodbye", "i have to go now"): "Goodbye! It was nice to talk with you.",
+    ("i like you",): "[nod] That is kind of you. I like to look at you, too.",
+    ("thank you", "thank you very much"): "[nod] You are welcome.",
+    ("goodbye", "i have to go now"): "Goodbye! [nod] It was nice to talk with you.",
 }
 EXAMPLES = (
     "where is the pink triangle", "can you hear me", "how old are you", "show me the red square",
@@ -50,16 +60,19 @@ PIECES = (
 
 The white one is a trapezoid: the dictionary of `sphinx` has no such word."""
 SEVERAL = "There are several of these. Say colour and shape, as in: where is the blue square."
-OTHERWISE = "I did not understand that. Say, for example: {example}."
+OTHERWISE = "[shake] I did not understand that. Say, for example: {example}."
 SILENCE = (
     # seconds in which somebody has said nothing, and what the robot says then; the first one greets
-    (1.0, "Hello! I am glad that you are here. How are you?"),
+    (1.0, "[nod] Hello! I am glad that you are here. How are you?"),
     (15.0, "You can say: what can you do, or: where is the blue square."),
     (25.0, "Do you need help?"),
     (40.0, "I see that you are busy. Goodbye!"),
 )
 WORDS = 10.0
 """Seconds for which the robot waits for words of somebody whose voice it hears."""
+LISTENS = 2.5
+"""Seconds for which somebody has spoken when the robot nods, to say that it listens: no phrase of ours is so long,
+and its answer would wait for the end of the nod."""
 PHRASES = (
     *(phrase for phrases in RULES for phrase in phrases),
     *(f"where is the {piece}" for piece in PIECES if piece != "blue square"),
@@ -87,20 +100,31 @@ async def talk_with(robot: Robot, person: str, floor: asyncio.Lock) -> None:
     floor: of the robot, which says one thing at a time.
     """
     silence, heard_id, speaks = list(SILENCE), "", False
-    with robot.utterances() as utterances:
-        while True:
-            seconds, line = silence[0] if silence else (None, "")
-            said = await utterances.next(WORDS if speaks else seconds)
-            if said is None and not speaks:
-                silence.pop(0)
-                async with floor:
-                    await say(robot, person, line, 3)
-            speaks = said is not None and said.actor == person and not said.final
-            if said is not None and said.actor == person and said.final and said.id != heard_id:
-                heard_id, text = said.id, answer(said.text, (await robot.world()).objects)
-                silence = [] if text.startswith("Goodbye") else list(SILENCE[1:])
-                async with floor:
-                    await say(robot, person, text, 2)
+    now, nods_at = asyncio.get_running_loop().time, None
+    async with asyncio.TaskGroup() as nods:
+        with robot.utterances() as utterances:
+            while True:
+                seconds, line = silence[0] if silence else (None, "")
+                if speaks:
+                    seconds = WORDS if nods_at is None else max(0.0, nods_at - now())
+                said = await utterances.next(seconds)
+                if said is None and nods_at is not None:
+                    nods_at = None
+                    if not floor.locked():
+                        nods.create_task(perform(robot, person, "backchannel", parts_of("[nod]")))
+                    continue
+                if said is None and not speaks:
+                    silence.pop(0)
+                    async with floor:
+                        await say(robot, person, line, 3)
+                spoke, speaks = speaks, said is not None and said.actor == person and not said.final
+                if not spoke or not speaks:
+                    nods_at = now() + LISTENS if speaks else None
+                if said is not None and said.actor == person and said.final and said.id != heard_id:
+                    heard_id, text = said.id, answer(said.text, (await robot.world()).objects)
+                    silence = [] if text.startswith("Goodbye") else list(SILENCE[1:])
+                    async with floor:
+                        await say(robot, person, text, 2)
 
 
 def answer(words: str, things: Iterable[Entity] = ()) -> str:
@@ -135,17 +159,32 @@ async def say(robot: Robot, person: str, text: str, turn_index: Literal[2, 3]) -
         text = text.format(example=next(NEXT))
     match = re.fullmatch(r"(.*?[.!]?)\s*([^.!?]*\?)?", text)
     told, asked = match.groups() if match else (text, None)
+    for words, index in ((told, turn_index), (asked, 1)):
+        if words:
+            await perform(robot, person, "full", parts_of(words), turn_index=index)
+
+
+def parts_of(text: str) -> list[dict[str, str]]:
+    """Make the parts of a turn: words, and what stands in brackets."""
+    parts = [
+        part_of(each) if number % 2 else {"say": each} for number, each in enumerate(re.split(r"\[(.*?)\]", text))
+    ]
+    return [each for each in parts if each.get("say", "words").strip(" .")]
+
+
+def part_of(bracket: str) -> dict[str, str]:
+    """Make the part of a turn that a bracket means: `nod`, `shake`, `look` and a thing, or a thing to be shown."""
+    if bracket in ("nod", "shake"):
+        return {"gesture": bracket}
+    word, _, thing = bracket.partition(" ")
+    return {"look": thing} if word == "look" else {"refer": bracket}
+
+
+async def perform(robot: Robot, person: str, status: str, parts: list[dict[str, str]], **more: int) -> None:
+    """Perform a turn for a person. One that cannot be performed is told, and the talk goes on."""
     try:
-        for words, index in ((told, turn_index), (asked, 1)):
-            if words:
-                parts = [
-                    {"refer": each} if number % 2 else {"say": each}
-                    for number, each in enumerate(re.split(r"\[(.*?)\]", words))
-                    if each.strip(" .")
-                ]
-                turn = {"turn_status": "full", "turn_index": index, "parts": parts}
-                await robot.perform(turn, addressee=person)
-    except EngageError as error:  # they have gone, or somebody stops the robot: the talk goes on
+        await robot.perform({"turn_status": status, "parts": parts, **more}, addressee=person)
+    except EngageError as error:  # they have gone, or somebody stops the robot
         print(error)
 
 

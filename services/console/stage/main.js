@@ -11,7 +11,7 @@ const TOLD = 4; // seconds for which news of an order are shown
 const at = (what) => document.querySelector(what);
 const asked = new URLSearchParams(location.search);
 const isKiosk = asked.has("kiosk");
-const robotSpeaks = document.body.dataset.language;
+const { language: robotSpeaks, examples } = document.body.dataset;
 const state = { robot: document.body.dataset.robot, person: "", scene: null, talk: null, text: null, denied: "", link: "" };
 const clock = () => performance.now() / 1000;
 
@@ -23,7 +23,7 @@ let news = { text: "", until: 0 };
 
 const order = (what) => link.send(what);
 const bar = bars({
-  top: at(".top"), bottom: at(".bar"), order, session: () => link.session,
+  top: at(".top"), bottom: at(".bar"), order, session: () => link.session, examples: JSON.parse(examples), spoken: robotSpeaks,
   turn() {
     spoken = another(spoken);
     if (!isKiosk) localStorage.setItem("engage-language", spoken);
@@ -175,13 +175,13 @@ function hint(now) {
   if (!person) return "";
   if (isTalking()) return text.talks;
   if (bar.points) return text.pointing;
-  const thing = (id) => state.scene.things.find((each) => each.id === id)?.label ?? id;
+  const named = (id) => state.scene.things.find((each) => each.id === id)?.label ?? text.called(id);
   const met = moment(talk, state.scene.robot, person);
   const next = visit(now - idle, { seated: true, kiosk: isKiosk, touched });
   const tips = text.tips(bar.ear);
-  if (next.do === "tip" && met?.text !== "looking") return tips[next.number % tips.length];
+  if (next.do === "tip" && !["looking", "elsewhere"].includes(met?.text)) return tips[next.number % tips.length];
   if (met?.text === "looking" && ["off", "lacking"].includes(bar.ear)) return tips[0];
-  if (met) return typeof text[met.text] === "function" ? text[met.text](thing(met.about)) : text[met.text];
+  if (met) return typeof text[met.text] === "function" ? text[met.text](named(met.about)) : text[met.text];
   return tips[0];
 }
 
@@ -194,6 +194,7 @@ function tick() {
   const next = visit(now - idle, { seated: Boolean(state.person), kiosk: isKiosk, touched });
   if (next.do === "anew") {
     touched = false;
+    link.end();
     location.replace(`${location.pathname}?kiosk`);
     return;
   }

@@ -16,11 +16,13 @@ export function visit(idle, { seated, kiosk, touched }) {
 // What goes on between the robot and a person, in the order of what they should know first: the name of a text, and a thing that it is about.
 export function moment(talk, robot, you) {
   const bonds = talk.bonds.filter(({ by, to }) => (by === robot && to === you) || (by === you && to === robot));
+  const says = talk.voices.find(({ actor, to }) => actor === robot && to.length)?.to ?? [];
   const waits = (kind) => bonds.find((each) => each.kind === kind && each.by === robot && !each.met);
-  if (talk.voices.some(({ actor, to }) => actor === robot && to.includes(you))) {
+  if (says.includes(you)) {
     const look = waits("directed_gaze");
     return look ? { text: "about", about: look.about[0] } : { text: "listen" };
   }
+  if (says.length) return { text: "elsewhere", about: says[0] };
   if (waits("adjacency_pair")) return { text: "looking" };
   if (waits("directed_gaze")) return { text: "about", about: waits("directed_gaze").about[0] };
   if (bonds.some((each) => each.kind === "mutual_facial_gaze" && each.met)) return { text: "mutual" };

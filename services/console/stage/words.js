@@ -22,6 +22,7 @@ const ENGLISH = {
   typing: (language) => `Say something in ${language}`,
   speaking: (language) => `It speaks ${language}.`,
   send: "Say it",
+  sayings: "What you can say",
   quick: [["Hello", "Hello!", null], ["Yes", "Yes.", "nod"], ["No", "No.", "shake"]],
   nod: "Nod",
   point: "Point",
@@ -37,6 +38,7 @@ const ENGLISH = {
   mutual: "You look into each other's eyes.",
   meet: "The robot looks at you. Touch its face to look back.",
   listen: "The robot is speaking to you.",
+  elsewhere: (name) => `The robot is speaking to ${name}.`,
   tips: (ear) => [
     ...({ on: ["Just talk: the robot hears you."], off: ["Press the microphone, and talk."], lacking: ["Type what you want to say."] }[ear] ?? []),
     "Touch a piece to look at it.", "Drag a piece to move it.", ...(ear === "none" ? ["Hold the round button, and talk."] : []), "Choose Point, and touch a piece.",
@@ -78,6 +80,7 @@ const GERMAN = {
   typing: (language) => `Sag etwas auf ${language}`,
   speaking: (language) => `Er spricht ${language}.`,
   send: "Sagen",
+  sayings: "Was du sagen kannst",
   quick: [["Hallo", "Hallo!", null], ["Ja", "Ja.", "nod"], ["Nein", "Nein.", "shake"]],
   nod: "Nicken",
   point: "Zeigen",
@@ -93,6 +96,7 @@ const GERMAN = {
   mutual: "Ihr schaut euch in die Augen.",
   meet: "Der Roboter schaut dich an. Berühre sein Gesicht, um zurückzuschauen.",
   listen: "Der Roboter spricht mit dir.",
+  elsewhere: (name) => `Der Roboter spricht mit ${name}.`,
   tips: (ear) => [
     ...({ on: ["Sprich einfach: der Roboter hört dich."], off: ["Drück auf das Mikrofon, und sprich."], lacking: ["Schreib, was du sagen willst."] }[ear] ?? []),
     "Berühre ein Teil, um es anzusehen.", "Zieh ein Teil, um es zu bewegen.", ...(ear === "none" ? ["Halte den runden Knopf, und sprich."] : []), "Wähle Zeigen, und berühre ein Teil.",

@@ -7,7 +7,7 @@ import re
 import secrets
 import socket
 from base64 import b64encode
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator, Sequence
 from hashlib import sha256
 from html import escape
 from importlib.util import find_spec
@@ -32,7 +32,7 @@ from engage_hri.services.console.web.frames import Outbox, Receipts, Viewer, You
 from engage_hri.services.console.web.guard import App, Guarded, Hosts
 from engage_hri.services.console.web.played import PlayedPicture
 from engage_hri.services.console.web.service import WindowServer
-from engage_hri.services.console.web.sessions import CLOSED, PageSession, Sessions
+from engage_hri.services.console.web.sessions import OVER, PageSession, Sessions
 from engage_hri.services.console.web.sounds import Sounds
 from engage_hri.services.console.web.stage import StageFace
 from engage_hri.services.console.web.visitor import Visitor
@@ -73,14 +73,21 @@ NO_TEXT = 1003
 """Code of RFC 6455 with which a WebSocket is closed that sends bytes."""
 
 
-def application(window: WindowServer, hosts: Hosts, token: str, language: str, pages: Path | None = None) -> App:
+def application(
+    window: WindowServer,
+    hosts: Hosts,
+    token: str,
+    language: str,
+    examples: Sequence[str] = (),
+    pages: Path | None = None,
+) -> App:
     """The page and its frames, for requests that name one of these hosts.
 
     pages: a folder of pages of somebody else, which may listen to the messages. token: who takes part has it in the
     address of the page at the first visit, and then in a cookie, which no script can read: the page's address may be
     seen, copied, and kept in the history of the browser. The stage has another one (`stage_token`), with which
     one sits down and does no more. language: of what one says to the robot, as a tag: the stage tells who reads
-    another one.
+    another one. examples: what one may say to it, which the stage shows.
     """
     visitors = stage_token(token)
     workshop = Sessions(lambda receipts, trusted: Visitor(window, trusted, receipts), MOST_VIEWERS)
@@ -122,7 +129,7 @@ def application(window: WindowServer, hosts: Hosts, token: str, language: str, p
         WebSocketRoute(MESSAGES, messages),
         WebSocketRoute("/voice", sounds.voice),
         WebSocketRoute("/microphone", sounds.microphone),
-        Route("/stage", _page(STAGE, window.bus.robot, visitors, language)),
+        Route("/stage", _page(STAGE, window.bus.robot, visitors, language, examples)),
         WebSocketRoute(STAGE_FRAMES, shows(stage, visitors)),
         Mount("/stage", _Fresh(directory=STAGE)),
     ]
@@ -155,10 +162,14 @@ def recorded(recording: Recording, hosts: Hosts) -> App:
     return Guarded(_app(recording.robot, frames, sessions.close), hosts)
 
 
-def page_of(robot: str, folder: Path = PAGE, language: str = "") -> str:
-    """The page of a robot, which knows the kinds of connection events. folder: its files. language: of the talk."""
+def page_of(robot: str, folder: Path = PAGE, language: str = "", examples: Sequence[str] = ()) -> str:
+    """The page of a robot, which knows the kinds of connection events. folder: its files.
+
+    language, examples: of the talk.
+    """
     kinds = [(kind, each.short or each.title, each.is_answered) for kind, each in EVENT_KINDS.items()]
     page = (folder / "index.html").read_text(encoding="utf-8").replace("{kinds}", escape(json.dumps(kinds)))
+    page = page.replace("{examples}", escape(json.dumps([*examples])))
     return page.replace("{robot}", escape(robot)).replace("{language}", escape(language))
 
 
@@ -189,12 +200,14 @@ def _app(
     return Starlette(routes=routes, lifespan=life)
 
 
-def _page(folder: Path, robot: str, token: str, language: str = "") -> Callable[[Request], Awaitable[Response]]:
+def _page(
+    folder: Path, robot: str, token: str, language: str = "", examples: Sequence[str] = ()
+) -> Callable[[Request], Awaitable[Response]]:
     """Answer with the `index.html` of a folder, and take the token out of its address at the first visit.
 
     token: empty: there is none.
     """
-    page = page_of(robot, folder, language)
+    page = page_of(robot, folder, language, examples)
     imports = re.search("<script type=.importmap.>(.*?)</script>", page)
     assert imports is not None
     digest = b64encode(sha256(imports[1].encode()).digest()).decode()
@@ -244,7 +257,7 @@ async def _shown(browser: WebSocket, sessions: Sessions, trusted: bool) -> None:
     if session is None:
         await browser.close(FULL, WORDS_FULL)
         return
-    link, code = session.links, CLOSED[0]
+    link, code = session.links, OVER
     try:
         await _show(browser, session)
     except WebSocketDisconnect as end:

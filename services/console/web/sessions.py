@@ -1,7 +1,10 @@
 """Sessions of pages: what a window keeps of each page over all links to it.
 
 A link that breaks ends nothing: the page makes another one, and has its seat, what the robot does for it, and the
-news of its orders as before. A page that was closed, or does not come back in time, has its session ended.
+news of its orders as before. The same holds for a page that is loaded anew. But nobody can tell a page that is loaded
+anew from one that is closed before it comes back, and a robot must not talk to an empty seat for long. So a page that
+goes has less time to come back than one whose link breaks. The session of a page that says that it is over, or does
+not come back in time, ends.
 """
 
 import asyncio
@@ -15,8 +18,14 @@ from engage_hri.services.console.web.orders import Given
 
 KEPT: Seconds = 20.0
 """Time that a page has to come back after its link broke."""
-CLOSED = (1000, 1001)
-"""Codes with which a link ends whose page was closed, by RFC 6455."""
+RELOADED: Seconds = 8.0
+"""Time that a page has to come back after it was closed, or loaded anew. Ours: a slow phone loads it in five."""
+OVER = 1000
+"""Code with which a link ends whose page is over, by RFC 6455: a kiosk begins anew for the next visitor."""
+GOING = 1001
+"""Code of RFC 6455 with which a link ends whose browser goes from the page."""
+LEAVES = 4001
+"""Code with which a page ends its link when it goes: pages themselves cannot say 1001."""
 
 
 class Guest(Protocol):
@@ -87,10 +96,11 @@ class Sessions:
         if session.links != link or session.receipts.session not in self._known:
             return
         session.link = None
-        if code in CLOSED:
+        if code == OVER:
             await self._end(session)
-        else:
-            session.ending = asyncio.create_task(self._end(session, KEPT), name="page that may come back")
+            return
+        grace = RELOADED if code in (GOING, LEAVES) else KEPT
+        session.ending = asyncio.create_task(self._end(session, grace), name="page that may come back")
 
     async def close(self) -> None:
         """End all sessions."""

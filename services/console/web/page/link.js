@@ -6,7 +6,9 @@ const LOOK = 250; // ms between two looks at how the link is
 const SILENCE = 16; // looks without any frame after which the window is away
 const DEAD = 60; // looks without any frame after which the link is given up: that of a computer that changes its network never ends by itself
 const NOTED = 0.5; // seconds after which an order without an answer is shown
-const KEPT = `engage-orders ${location.pathname}`; // what is left over as the page is loaded anew; another path is another robot
+const LEAVES = 4001; // code with which the link of a page ends that may be loaded anew: its session stays for a while
+const OVER = 1000; // and of one that is over: its session ends
+const KEPT = `engage-session ${location.pathname}`; // the session, and orders that are left over, while the page is loaded anew; another path is another robot
 const clock = () => Date.now() / 1000; // goes on while a computer sleeps
 
 // take: gets each frame, and whether it is the first of a link. tell: whether the window is there, and why not. report: what was not done. wait: names of orders without an answer.
@@ -73,17 +75,25 @@ export function follow({ place: frames = "frames", take, tell, report, wait }) {
     socket.close();
     open();
   }, LOOK);
-  addEventListener("pagehide", () => {
+  function end(code) {
     ended = true;
     clearInterval(watch);
-    if (orders.pending(Infinity).length) sessionStorage.setItem(KEPT, JSON.stringify(orders.kept()));
-    socket.close(1000);
+    socket.close(code);
+  }
+  // Only while it is away is the session written down: a second tab that copies this one is somebody else.
+  addEventListener("pagehide", () => {
+    if (ended) return;
+    sessionStorage.setItem(KEPT, JSON.stringify(orders.kept()));
+    end(LEAVES);
   });
+  addEventListener("pageshow", ({ persisted }) => persisted && location.reload()); // its link has ended
   open();
   return {
     get session() {
       return orders.session;
     },
+    // Nobody who comes after this page has its seat.
+    end: () => end(OVER),
     send(order) {
       say(orders.give(order, clock()));
       flush();

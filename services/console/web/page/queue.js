@@ -36,9 +36,10 @@ export function named(order) {
   }
 }
 
-// kept: what another page of this place had left over as it was loaded anew.
+// kept: what this page had as it was loaded anew.
 export function queue(kept) {
   let { session = "", number = 0, sent = [], waiting = [] } = kept ?? {};
+  let hasBegun = sent.length + waiting.length > 0; // else it is no news to a page that its session has ended while it was away
   const report = (order, why) => ({ panel: panel(order), text: `Not done: ${named(order)}. ${why}` });
 
   // Put Stop in front of all that has not left; what the robot was to do before it is void.
@@ -67,7 +68,8 @@ export function queue(kept) {
     open(its, taken) {
       const unknown = its === session ? [] : sent;
       const back = its === session ? sent.filter((each) => each.number > taken) : [];
-      const isAnew = Boolean(session) && its !== session;
+      const isAnew = hasBegun && Boolean(session) && its !== session;
+      hasBegun = true;
       [session, number, sent] = [its, taken, []];
       waiting = [...back.map(({ order, at }) => ({ order, at })), ...waiting];
       const reports = [...unknown.map(({ order }) => ({ panel: panel(order), text: `Nobody knows whether this was done: ${named(order)}. The window was started anew before it answered.` })), ...stopFirst()];

@@ -9,6 +9,9 @@ const VIEWS = {
   "as the person sees it": [[1.55, 0, 1.38], [0.3, 0, 0.85]],
   "as the robot sees it": [[-0.55, 0.25, 1.75], [0.75, 0, 0.7]],
 };
+const UPRIGHT = 42; // degrees that the camera sees at least, upright
+const ACROSS = 0.46; // tangent of half of what it sees at least from left to right: the floor is whole there
+const FLOOR = 1.0; // metres from its middle to its edge: robot and people stand on it
 
 export function space(panel, order) {
   const place = panel.querySelector(".space");
@@ -36,7 +39,7 @@ export function space(panel, order) {
     renderer.setSize(width, height);
     labels.setSize(width, height);
     camera.aspect = width / height;
-    camera.fov = width / height < 1.2 ? 55 : 42;
+    camera.fov = Math.max(UPRIGHT, (2 * Math.atan(ACROSS / camera.aspect) * 180) / Math.PI);
     camera.updateProjectionMatrix();
     stale = true;
   }).observe(place);
@@ -121,8 +124,8 @@ function furniture(scene) {
   const sky = new THREE.HemisphereLight("#ffffff", "#8b8577", 2.1);
   const lamp = new THREE.DirectionalLight("#fff4e2", 1.6);
   lamp.position.set(1.2, 1.6, 3.2);
-  const floor = new THREE.Mesh(new THREE.CircleGeometry(1.45, 64), material("#cfd6d8"));
-  floor.position.x = 0.6; // below the table, and whole in each view
+  const floor = new THREE.Mesh(new THREE.CircleGeometry(FLOOR, 64), material("#cfd6d8"));
+  floor.position.x = 0.6; // below the table
   scene.add(sky, lamp, floor);
   return {
     theme(dark) {
