@@ -34,7 +34,10 @@ class HeadPolicy:
         """Name, and place in the order, from 1: the strongest. The arbiter sets both."""
 
     def feed(self, message: Observation, now: Seconds) -> None:
-        """Take what has happened. The scene has taken it before."""
+        """Take what has happened.
+
+        message: what is perceived, recognised, or told of the body; the scene has taken it before. now: in seconds.
+        """
 
     @property
     def deadline(self) -> Seconds | None:
@@ -42,18 +45,24 @@ class HeadPolicy:
         return None
 
     def claim(self, now: Seconds, weaker: Sequence[Claim]) -> Claim | None:
-        """Tell what the head is claimed for now; None: for nothing. weaker: claims of policies that come after."""
+        """Tell what the head is claimed for; None: for nothing.
+
+        now: in seconds. weaker: claims of policies that come after.
+        """
         return None
 
     def has_head(self, has: bool, now: Seconds) -> None:
-        """Note whether the arbiter gives the head to claims of this kind. It is called after each ruling."""
+        """Note after each ruling who has the head.
+
+        has: True if it is given to claims of this kind. now: in seconds.
+        """
 
     def join(self, other: str, name: str) -> None:
-        """Take two ids for one person, who is called `name` from now on."""
+        """Take two ids for one person. other: the id that is used no more. name: the id from now on."""
         self.forget(other)
 
     def forget(self, person: str) -> None:
-        """Drop what is known of somebody who has been gone for long."""
+        """Drop what is known of somebody who has been gone for long. person: their id."""
 
     def recognition_lost(self) -> None:
         """Drop what recognition has told: the ends of its events and speeches will never come."""
