@@ -71,7 +71,7 @@ async def test_who_comes_is_greeted_answered_and_told_goodbye() -> None:
     greeting = spoken(SILENCE[0][1])
     assert going.turns == [
         greeting.removesuffix(" How are you?"), "How are you?", "Hello!", "How are you?", "I am glad to hear that.",
-        "Here is the blue square", "Goodbye! It was nice to talk with you.",
+        "Look at the blue square", "Goodbye! It was nice to talk with you.",
     ]  # fmt: skip
 
 
@@ -140,10 +140,10 @@ async def test_who_wants_help_hears_each_time_other_examples_and_may_ask_for_any
     assert one.startswith("Then say, for example: ")
     told = [{each for each in EXAMPLES if each in line} for line in (one, other)]
     assert ([len(each) for each in told], told[0] & told[1]) == ([3, 3], set())
-    assert rest[0] == "Here is the pink triangle"
+    assert rest[0] == "Look at the pink triangle"
     assert rest[-1] == "As you like."
     assert {answer(f"show me the {piece}", things) for piece in PIECES} == {
-        f"Here is [{each.id}]." for each in things
+        f"Look at [{each.id}]." for each in things
     }
     assert answer("Where is the square?", things) == SEVERAL
     assert [answer(each, things) for each in EXAMPLES if answer(each, things) == OTHERWISE] == []

@@ -39,8 +39,8 @@ RULES = {
         "what is on the table",
         "what are these",
     ): "[look table] These are the pieces of a puzzle. Which one do you like?",
-    ("the blue one", "where is the blue square"): "Here is [blue-square].",
-    ("the red one", "show me the red square"): "Here is [red-square].",
+    ("the blue one", "where is the blue square"): "Look at [blue-square].",
+    ("the red one", "show me the red square"): "Look at [red-square].",
     ("tell me a joke", "make me laugh"): "What does a robot do at lunch? It has a megabyte.",
     ("i like you",): "[nod] That is kind of you. I like to look at you, too.",
     ("thank you", "thank you very much"): "[nod] You are welcome.",
@@ -144,7 +144,7 @@ def shown(words: set[str], things: Iterable[Entity]) -> str:
     """Find what the robot says to words for colour and shape. Empty: no thing has these."""
     fits = {thing.id: len({thing.color, thing.shape} & words) for thing in things}
     best = [id for id, fit in fits.items() if fit == max(fits.values()) > 0]
-    return (SEVERAL if len(best) > 1 else f"Here is [{best[0]}].") if best else ""
+    return (SEVERAL if len(best) > 1 else f"Look at [{best[0]}].") if best else ""
 
 
 async def say(robot: Robot, person: str, text: str, turn_index: Literal[2, 3]) -> None:
