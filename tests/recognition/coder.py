@@ -12,8 +12,9 @@ from msgspec import Struct
 from msgspec.structs import astuple
 
 from engage_hri.schemas.recognition import ConnectionEvent
+from tests.recognition.drawing import Drawing
 from tests.recognition.observations import ROBOT
-from tests.recognition.timeline import LIMIT, LISTENING, Absence, Drawing, Instant, Span, Timeline, Turn
+from tests.recognition.timeline import LIMIT, LISTENING, Absence, Instant, Span, Timeline, Turn
 
 BRIEF = 0.8
 """Longest speech of a listener whose words nobody tells."""
@@ -436,7 +437,7 @@ def rounded(events: Sequence[Coded]) -> list[Coded]:
 def differences(seed: int) -> tuple[int, list[str]]:
     """Number of events of a drawn timeline, and what only one of recognition and the coder has."""
     timeline = Drawing(seed).timeline
-    told, coded = rounded(as_told(timeline.told())), rounded(Coder(timeline).events())
+    told, coded = rounded(as_told(timeline.told().events)), rounded(Coder(timeline).events())
     return only_one_has(told, coded)
 
 
