@@ -12,7 +12,6 @@ from msgspec import Struct
 from msgspec.structs import astuple
 
 from engage_hri.schemas.recognition import ConnectionEvent
-from tests.recognition.drawing import Drawing
 from tests.recognition.observations import ROBOT
 from tests.recognition.timeline import LIMIT, LISTENING, Absence, Instant, Span, Timeline, Turn
 
@@ -432,13 +431,6 @@ def rounded(events: Sequence[Coded]) -> list[Coded]:
     return [
         Coded(*(round(value, 5) if isinstance(value, float) else value for value in astuple(each))) for each in events
     ]
-
-
-def differences(seed: int) -> tuple[int, list[str]]:
-    """Number of events of a drawn timeline, and what only one of recognition and the coder has."""
-    timeline = Drawing(seed).timeline
-    told, coded = rounded(as_told(timeline.told().events)), rounded(Coder(timeline).events())
-    return only_one_has(told, coded)
 
 
 def only_one_has(told: Sequence[object], coded: Sequence[object]) -> tuple[int, list[str]]:

@@ -16,6 +16,8 @@ from tests.recognition.observations import PIECES, ROBOT, request_event, stamp, 
 
 NAMES = ("ann", "bob", "cy", "dee", "eve")
 STRANGER = "zed"
+SAID_BEFORE = -59.0, -58.0
+"""What somebody says before all else, where words are told."""
 LIMIT = 4.0
 Instant = tuple[float, int]
 """A time, and a place in the order of what happens then."""
@@ -95,9 +97,9 @@ class Timeline(Struct):
         to = frozenset((ROBOT,)) if self.tells else None
         steps: list[tuple[float, Callable[[float], None]]] = [
             (-60.0, lambda at: log.found(STRANGER, at)),
-            (-59.0, lambda at: log.begins(STRANGER, "speak", at)),
-            (-58.0, lambda at: log.ends(STRANGER, "speak", at)),
-            (-57.9, lambda at: log.hears(STRANGER, -59.0, -58.0, "so", at, to=to)),
+            (SAID_BEFORE[0], lambda at: log.begins(STRANGER, "speak", at)),
+            (SAID_BEFORE[1], lambda at: log.ends(STRANGER, "speak", at)),
+            (-57.9, lambda at: log.hears(STRANGER, *SAID_BEFORE, "so", at, to=to)),
             (-40.0, lambda at: log.take(world(*self.people), at)),
             (-40.0, lambda at: log.take(ActorLost(actor=STRANGER, at=stamp(at), left=True), at)),
         ]  # fmt: skip
