@@ -262,7 +262,7 @@ who stands by and says "uh-huh" to the robot listens
 ... or goes on when the robot is silent
     0 ann said 0; 1 robot asks ann 4; 1 bob looks robot; 4.8 bob speaks 0.4; 5.6 bob said 4.8 words=uh-huh; 20 end
     robot: started 1, failed 9
-    bob: started 4.8, started 5.6, failed 9.2
+    bob: started 4.8, failed 9.2
 
 words that come late after a second speech are those of the first
     0 ann said 0; 1 robot asks ann 2; 3.5 ann speaks 0.3; 5.4 ann speaks 1; 6 ann said 3.5; 6.5 ann said 5.4; 30 end

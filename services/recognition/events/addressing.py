@@ -23,11 +23,12 @@ It is a cough, or a laugh at what a neighbor says.
 """
 
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 
 from msgspec import Struct, field
 
-from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.recognition.events.listener_sign import SignPart
 
 LONGEST_UNKNOWN: Seconds = 3.0
 """Time after which a sound that still goes on is speech, and it is decided by the looks so far to whom. Ours."""
@@ -93,19 +94,27 @@ class FaceTimes(Struct):
         half = (self.at - since) / 2
         return next((face for face, lasted in self.looked.items() if lasted > half), "")
 
+    @property
+    def seen(self) -> set[str]:
+        """The faces that were looked at."""
+        return {face for face in (*self.looked, self.face) if face}
+
 
 class OwnSpeech(Spoken, kw_only=True):
     """A speech of a person, and what tells to whom it is."""
 
-    confidence: Probability
+    part: SignPart
+    """What the conversation is told of it."""
     faces: FaceTimes
+    company: Addressees = NOBODY
+    """Other people who were here."""
     told: Addressees | None = None
     """Addressees by perception."""
     words: str = ""
     is_into_turn: bool = False
     """True if it began while the robot had the floor, as far as is known."""
-    is_interjected: bool = False
-    """True if it has been told of as such."""
+    is_heard: bool = False
+    """True once it has been told to the conversation."""
     is_beside: bool = False
     """True if it began while the robot said something to others."""
     may_be_noise: bool = False
@@ -139,18 +148,13 @@ def _plain(words: list[str]) -> str:
     return " ".join(words).strip(MARKS).casefold()
 
 
-def certain(
-    speech: OwnSpeech, company: Collection[str], robot: str, names: Mapping[str, str], *, is_line: bool
-) -> Addressees | None:
-    """Addressees by rules 1 to 3; None if these do not say.
-
-    company: other people who are here. is_line: it was typed, which one does to the robot.
-    """
+def certain(speech: OwnSpeech, robot: str, names: Mapping[str, str], *, is_line: bool) -> Addressees | None:
+    """Addressees by rules 1 to 3; None if these do not say. is_line: it was typed, which one does to the robot."""
     if speech.told is not None:
         return speech.told
     if found := named(speech.words, names):
         return found
-    return None if company and not is_line else frozenset((robot,))
+    return None if speech.company and not is_line else frozenset((robot,))
 
 
 def likely(

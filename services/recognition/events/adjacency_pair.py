@@ -98,11 +98,6 @@ class AdjacencyPair(Machine):
         return self.state == INTERRUPTED
 
     @property
-    def interrupted_since(self) -> Seconds | None:
-        """Start of the answer to the robot's first turn, which goes on; None: there is none."""
-        return self._response_since if self.state == INTERRUPTED and self._by_robot else None
-
-    @property
     def deadline(self) -> Seconds:
         if self.event is None or self.state not in (ROBOT_WAITING, HUMAN_WAITING, INTERRUPTED):
             return inf

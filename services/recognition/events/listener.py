@@ -21,19 +21,15 @@ from math import inf
 
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.recognition import InterjectionReading
-from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.addressing import WORDS_AFTER
 from engage_hri.services.recognition.events.backchannel import Backchannel
 from engage_hri.services.recognition.events.exchange import Exchange
-from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.listener_sign import WORDS_WAIT, ListenerSign, SignPart
 from engage_hri.services.recognition.events.machine import EventWriter, OngoingEvent, SpeechStart
 from engage_hri.services.recognition.events.scene import SessionScene
 from engage_hri.services.text.listening import is_listening, says_words
-
-SPEECHES_KEPT = 8
-"""Number of speeches of which words may still tell that they were something else."""
 
 
 class Listener:
@@ -50,15 +46,8 @@ class Listener:
         self._backchannel = Backchannel(writer, limit=config.backchannel_limit)
         self.sign: ListenerSign | None = None
         """What the person does in the robot's turn, as long as it is not decided what it is."""
-        self._speeches: Latest[Seconds, SignPart] = Latest(SPEECHES_KEPT)
-        """The person's latest speeches, by their starts."""
 
     # -- a sign -------------------------------------------------------------------------------------------------
-
-    def speaks(self, since: Seconds, confidence: Probability) -> SignPart:
-        """Note a speech, as a sign or not."""
-        speech = self._speeches[since] = SignPart("speak", since, confidence)
-        return speech
 
     def begins(self, part: SignPart, *, beside: bool = False) -> None:
         """Take a part of the sign that goes on, or of a new one. beside: the robot speaks to others."""
@@ -100,15 +89,6 @@ class Listener:
                 part.until = at
             self.judge(at)
 
-    def forget(self, since: Seconds, at: Seconds) -> None:
-        """Forget a speech of the sign, as that was for others."""
-        self._speeches.pop(since, None)
-        if self.sign is not None:
-            self.sign.parts = [part for part in self.sign.parts if part.action != "speak" or part.since != since]
-            self.sign = self.sign if self.sign.parts else None
-            self._scene.read(self._id, since, "other")
-            self.judge(at)
-
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         sign, self.sign = self.sign, None
         if sign is not None and not sign.speeches:
@@ -124,11 +104,14 @@ class Listener:
         sign = self.sign
         if sign is None or (sign.speeches and self._asks_for_nothing(sign.speeches[-1])):
             return inf
-        if not self._scene.is_worded:
-            return sign.deadline(self._config.backchannel_limit)
-        if sign.is_beside:
+        if sign.is_beside and self._scene.is_worded:
             return sign.deadline(self._scene.longest_unknown, WORDS_AFTER)
-        return sign.deadline(WORDS_WAIT)
+        return sign.deadline(self.longest)
+
+    @property
+    def longest(self) -> Seconds:
+        """Time after which a voice that goes on in the robot's turn is no listener's, if it has no words."""
+        return WORDS_WAIT if self._scene.is_worded else self._config.backchannel_limit
 
     def pass_time(self, at: Seconds) -> None:
         """Decide the sign: its speech has become too long for a backchannel, or its words have not come."""
@@ -164,14 +147,11 @@ class Listener:
                 self._takes_floor(part, at, reading)
                 return
 
-    def understand(self, since: Seconds, at: Seconds, *, in_turn: bool, is_last: bool) -> None:
+    def understand(self, speech: SignPart, at: Seconds, *, in_turn: bool, is_last: bool) -> None:
         """Judge a speech by its words.
 
         in_turn: the robot's turn goes on in which it was said. is_last: neither has begun to say anything since.
         """
-        speech = self._speeches.get(since)
-        if speech is None:
-            return
         if self.sign is not None and any(part is speech for part in self.sign.parts):
             if self._is_echo(speech):
                 self._tell(speech, at)  # the robot need not wait until it is over
@@ -181,7 +161,7 @@ class Listener:
         is_new = speech.taken_for == "noise" and (in_turn or is_last)
         if listens is False and (is_new or (in_turn and speech.taken_for == "backchannel")):
             self._is_turn(speech, "interruption" if in_turn else "answer", at)
-        elif listens and (is_new or self._exchange.pair.was_listening(since)):
+        elif listens and (is_new or self._exchange.pair.was_listening(speech.since)):
             if speech.until is None:
                 self._joins(speech)
             else:

@@ -209,9 +209,8 @@ class EventWriter:
         self.effects.append(told)
 
     def decide_interjection(self, person: str, speech: Seconds, reading: InterjectionReading, at: Seconds) -> None:
-        """Tell what it is that somebody says into the robot's turn, if only that it began has been told."""
-        told = self._interjected.get(SpeechStart(person, speech))
-        if told is not None and told.reading == "open":
+        """Tell what it is that somebody says into the robot's turn, if that it began has been told."""
+        if SpeechStart(person, speech) in self._interjected:
             self.interject(person, speech, reading, at)
 
     def interject_again(self, person: str, speech: Seconds, at: Seconds) -> None:

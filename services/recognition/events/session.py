@@ -161,7 +161,7 @@ class Session:
         if began.actor == self.robot:
             self._robot_begins(began, at)
         else:
-            by_look = began.action == "look"
+            by_look = began.action == "look" and not self.scene.is_speaking(began.actor)
             self._people.observe(began.actor, at, lambda person: person.begins(began, at), by_look=by_look)
 
     def _ends(self, ended: ActionEnded, at: Seconds) -> None:
@@ -537,10 +537,9 @@ class Session:
         self._writer.effects.append(TurnOutcome(id=request.id, at=self._writer.stamp(at)))
 
     def _abort(self, actor: str, at: Seconds, turn: str) -> None:
-        """End the pairs of a turn that was cut off; first that of who has cut in, which may answer for all."""
-        here = [person for person in self.persons.values() if person.presence.here and actor in ("", person.id)]
-        for person in sorted(here, key=lambda each: each.talk.takes_floor_since):
-            self._people.apply(person.id, at, lambda person: person.abort(at, turn=turn))
+        """End the pairs of a turn that was cut off; first of those who have cut in, who may answer for all."""
+        self._tell(actor, at, lambda talk: talk.cut_off(at, turn=turn))
+        self._apply_to_addressees(actor, at, lambda person: person.abort(at, turn=turn))
 
     def _apply_to_addressees(self, actor: str, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
         """Apply a step to a known person, or to all (actor: empty)."""

@@ -10,7 +10,7 @@ A sound into the robot's own words is decided by the conversation, which knows w
 
 from collections import deque
 from collections.abc import Callable
-from math import inf
+from math import inf, nextafter
 
 from engage_hri.schemas.behaviors import EVENT_KINDS, Action, Event
 from engage_hri.schemas.perception import ActionBegan
@@ -29,12 +29,13 @@ from engage_hri.services.recognition.events.conversation import Conversation
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.kinds import KindRecognizer
 from engage_hri.services.recognition.events.limits import ROUNDING, LimitClock
+from engage_hri.services.recognition.events.listener_sign import WORDS_WAIT, SignPart
 from engage_hri.services.recognition.events.machine import EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import Question, SessionScene
-from engage_hri.services.text.listening import says_words
+from engage_hri.services.text.listening import is_listening, says_words
 
-WORDLESS_KEPT = 8
-"""Number of sounds of which words may still tell that they were speech, or for whom."""
+SPEECHES_KEPT = 8
+"""Number of speeches of each person of which words may still tell what they were, and for whom."""
 Step = Callable[[Conversation], object]
 
 
@@ -50,18 +51,13 @@ class Talk(KindRecognizer):
         """Start of the first turn of the robot that is in line; infinite: none is."""
         self.speech: OwnSpeech | None = None
         """The speech of the person that goes on."""
-        self._wordless: Latest[Seconds, OwnSpeech] = Latest(WORDLESS_KEPT)
-        """The latest sounds that were decided without words, and told to nobody, by their starts."""
+        self._speeches: Latest[Seconds, OwnSpeech] = Latest(SPEECHES_KEPT)
+        """The person's latest speeches, by their starts."""
 
     @property
     def is_in_contact(self) -> bool:
         """True while the person says something that is known to be for the robot."""
         return self.speech is not None and self.speech.is_to(self._scene.robot)
-
-    @property
-    def takes_floor_since(self) -> Seconds:
-        """Start of what the person says to the robot now, or has answered into its turn; infinite: of nothing."""
-        return self._conversation.takes_floor_since
 
     @property
     def question(self) -> Question | None:
@@ -103,11 +99,19 @@ class Talk(KindRecognizer):
 
     def _decided_at(self, speech: OwnSpeech) -> Seconds:
         """Time at which the first speech in line is decided."""
-        if speech.until is None:
-            return speech.since + self._scene.longest_unknown
-        may_call = self._scene.is_worded and not speech.faces.most(speech.since)
-        is_open = self._may_be_noise(speech) or may_call or self._scene.tells_addressees
-        return speech.until + (WORDS_AFTER if is_open else 0.0)
+        scene, listener, since, until = self._scene, self._conversation.listener, speech.since, speech.until
+        is_known = says_words(speech.words) or (self.id, since) in scene.echoes
+        is_sign = self._conversation.is_into_turn(since)  # it holds the robot, which waits for no more than it has to
+        if until is None:
+            seen = speech.faces.seen
+            if is_sign and is_known and seen <= {scene.robot} and not is_listening(speech.words):
+                return since
+            return since + (listener.longest if is_sign and seen == {scene.robot} else scene.longest_unknown)
+        if is_known or not (scene.is_worded or scene.tells_addressees):
+            return until
+        is_seen = is_sign and speech.faces.most(since) == scene.robot and not scene.tells_addressees
+        over = until + (0.0 if is_seen else WORDS_AFTER)
+        return max(over, since + WORDS_WAIT) if is_sign or speech.is_beside else over
 
     # -- the person ---------------------------------------------------------------------------------------------
 
@@ -117,6 +121,7 @@ class Talk(KindRecognizer):
             if speech.until is None:
                 speech.faces.turns(face, at)
                 self._may_interrupt(speech, face, at)
+        self.go_on(at)
 
     def begins(self, began: ActionBegan, at: Seconds, face: str) -> None:
         action, confidence = began.action, began.confidence
@@ -136,7 +141,7 @@ class Talk(KindRecognizer):
 
     def _speaks(self, at: Seconds, confidence: Probability, face: str) -> None:
         """Take the beginning of a speech. face: whose face the person looks at."""
-        self.speech = speech = self._own_speech(at, confidence, face)
+        speech = self._own_speech(at, confidence, face)
         speech.told, speech.words = self._scene.told_to(self.id, at), self._writer.text_of(self.id, at)
         # What waits in line may be the robot's own turn, so that only the scene knows that it has begun.
         said = self._scene.robot_spoken
@@ -147,7 +152,7 @@ class Talk(KindRecognizer):
         is_line = self._scene.lines.get(self.id) == at
         speech.may_be_noise = self._scene.is_worded and not (is_line or says_words(speech.words))
         speech.is_into_turn = is_into_turn
-        self._find(speech, face if is_into_turn else "", at)
+        self._find(speech, at)
         self._may_interrupt(speech, face, at)
         if not self._line:
             self._conversation.listener.next_begins()
@@ -156,9 +161,8 @@ class Talk(KindRecognizer):
     def _may_interrupt(self, speech: OwnSpeech, face: str, at: Seconds) -> None:
         """Tell of a speech into the robot's turn, unless it is for somebody else, or looks like that."""
         is_aside = face not in ("", self._scene.robot) if speech.to is None else not speech.is_to(self._scene.robot)
-        if speech.is_into_turn and not speech.is_interjected and not is_aside:
+        if speech.is_into_turn and not is_aside:
             self._writer.interject(self.id, speech.since, "open", at)
-            speech.is_interjected = True
 
     def _falls_silent(self, at: Seconds) -> None:
         """Take the end of the speech that goes on."""
@@ -182,65 +186,53 @@ class Talk(KindRecognizer):
 
     def goes_on(self, action: Action, since: Seconds, at: Seconds, confidence: Probability, face: str) -> None:
         """Take an action that goes on, known only now, at `at`. It has been decided by the looks of now to whom."""
+        part = SignPart(action, since, confidence)
         if action == "speak":
-            self.speech = speech = self._own_speech(since, confidence, face)
-            if not self._find(speech, face, at):
+            speech = self._own_speech(since, confidence, face)
+            if not self._find(speech, at):
                 self._address(speech, self._likely(speech, at), at)
             if not speech.is_to(self._scene.robot):
                 return
-        self.take(at, lambda talk: talk.goes_on(action, since, confidence))
+            speech.is_heard, part = True, speech.part
+        self.take(at, lambda talk: talk.goes_on(part))
 
     def understand(self, since: Seconds, words: str, told: Addressees | None, at: Seconds) -> None:
         """Take the words of a speech. told: addressees, if perception knows them."""
-        for speech in self._undecided:
-            if speech.since == since:
-                speech.words, speech.told = words or speech.words, told or speech.told
-                speech.may_be_noise &= not says_words(speech.words)
-                if speech.to is None:
-                    self._find(speech, "", at)
-        if (known := self._wordless.get(since)) is not None and (says_words(words) or told):
-            self._has_words(known, words, told, at)
-        self.take(at, lambda talk: self._open_is_for(talk, since, words, told, at))
-        self.take(at, lambda talk: talk.understand(since, at))
+        speech = self._speeches.get(since)
+        if speech is None:
+            return
+        speech.words, speech.told = words or speech.words, told or speech.told
+        speech.may_be_noise &= not says_words(speech.words)
+        if not speech.is_heard or speech.part.taken_for == "noise":
+            self._has_news(speech, at)
+        self.take(at, lambda talk: talk.understand(speech.part, at))
         self.go_on(at)
 
-    def _open_is_for(
-        self, talk: Conversation, since: Seconds, words: str, told: Addressees | None, at: Seconds
-    ) -> None:
-        """Take for whom a speech is that the face alone has told to be for the robot, as long as it is a sign."""
-        speech = self._scene.spoken_since(self.id, since)
-        if isinstance(speech, OwnSpeech) and speech.is_open:
-            speech.words, speech.told = words or speech.words, told or speech.told
-            if self._find(speech, "", at) and not speech.is_to(self._scene.robot):
-                talk.is_for_others(since, at)
-
-    def _has_words(self, speech: OwnSpeech, words: str, told: Addressees | None, at: Seconds) -> None:
-        """Take words that come late: the sound was speech after all, or is for others than it seemed."""
-        speech.words, speech.told = words or speech.words, told or speech.told
-        if speech.is_noise and not says_words(speech.words):
+    def _has_news(self, speech: OwnSpeech, at: Seconds) -> None:
+        """Take news of a speech of which nothing is told yet: it may be for others than it seemed, and no noise."""
+        is_noise, robot = speech.is_noise, self._scene.robot
+        if is_noise and not says_words(speech.words):
             return
-        if not self._find(speech, "", at) and speech.is_noise:
+        if not self._find(speech, at) and is_noise and not speech.is_heard:
             self._address(speech, self._likely(speech, at), at)
-        speech.is_noise = False
-        if not speech.is_to(self._scene.robot):
-            return  # more of the words may still call it
-        del self._wordless[speech.since]
-        since, until, confidence = speech.since, speech.until, speech.confidence
-        if any(each is speech for _, each in self._line):
-            return
-        if until is None:
-            self.take_early(since, lambda talk: talk.speaks(since, confidence, beside=speech.is_beside))
-        else:
-            self.take_early(since, lambda talk: talk.has_said(since, until, confidence))
+        if not speech.is_to(robot):
+            speech.is_noise = speech.is_heard = False  # more of the words may still call it
+        elif not speech.is_heard and not any(each is speech for _, each in self._line):
+            speech.is_noise, speech.is_heard = False, True
+            speech.part.until = speech.until
+            if speech.until is None:
+                self.take_early(speech.since, lambda talk: talk.speaks(speech.part, beside=speech.is_beside))
+            else:
+                self.take_early(speech.since, lambda talk: talk.has_said(speech.part))
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         """Take the person's leaving: nothing waits any longer."""
         if self.speech is not None and self.speech.until is None:
             self.speech.until = until
         self.speech = None
-        self._wordless.clear()
         for speech in self._undecided:
             self._decide(speech, at)
+        self._speeches.clear()
         self.go_on(at)
         self._take_in_order(at, lambda talk: talk.person_gone(at, until))
 
@@ -249,7 +241,11 @@ class Talk(KindRecognizer):
         self._conversation.robot_speaks_since = self._scene.robot_speaks_to(self.id)
 
     def _own_speech(self, since: Seconds, confidence: Probability, face: str) -> OwnSpeech:
-        return OwnSpeech(actor=self.id, since=since, confidence=confidence, faces=FaceTimes(since, face))
+        """Begin to remember a speech."""
+        part = SignPart("speak", since, confidence)
+        speech = OwnSpeech(actor=self.id, since=since, part=part, faces=FaceTimes(since, face))
+        self.speech = self._speeches[since] = speech
+        return speech
 
     # -- the line -----------------------------------------------------------------------------------------------
 
@@ -311,7 +307,8 @@ class Talk(KindRecognizer):
         self.take(at, lambda talk: talk.withdraw(event, at, is_orphan=is_orphan))
 
     def abort(self, at: Seconds, *, turn: str) -> None:
-        self.take(at, lambda talk: talk.abort(at, turn=turn))
+        # Who has interrupted the turn has done so before that, also if it is known only now, and told of `at`.
+        self._take_in_order(nextafter(at, inf), lambda talk: talk.abort(at, turn=turn))
 
     def block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
         self.take(at, lambda talk: talk.block_ended(block, at, aborted=aborted))
@@ -354,32 +351,33 @@ class Talk(KindRecognizer):
         """True if it is known to whom the first speech in line is, and that it is one."""
         return speech.to is not None and not self._may_be_noise(speech)
 
-    def _find(self, speech: OwnSpeech, face: str, at: Seconds) -> bool:
-        """Decide to whom the speech is if that is certain.
-
-        face: whose face the person looks at, if it begins in the robot's turn to them; else empty.
-        """
-        company = self._scene.company(self.id)
+    def _find(self, speech: OwnSpeech, at: Seconds) -> bool:
+        """Decide to whom the speech is if that is certain."""
+        speech.company |= self._scene.company(self.id)
         is_line = self._scene.lines.get(self.id) == speech.since
-        to = certain(speech, company, self._scene.robot, self._scene.names, is_line=is_line)
-        if to is None and face == self._scene.robot and not self._line:
-            to = frozenset((face,))  # into the robot's words to this person: it should hold at once
-        if to is not None:
+        to = certain(speech, self._scene.robot, self._scene.names, is_line=is_line)
+        if to is not None and to != speech.to:
             self._address(speech, to, at)
         return to is not None
 
     def _address(self, speech: OwnSpeech, to: Addressees, at: Seconds) -> None:
         speech.to = to
-        if speech.is_interjected and self._scene.robot not in to:
-            self._writer.interject(self.id, speech.since, "other", at)
+        if self._scene.robot not in to:
+            self._writer.decide_interjection(self.id, speech.since, "other", at)
         self._scene.note_spoken(speech)
 
     def _queue(self, at: Seconds, speech: OwnSpeech) -> None:
         is_next = speech.is_to(self._scene.robot) and self._waits_for_others(at)
         if self._line or not self._is_known(speech) or is_next:
             self._line.append((at, speech))
-        elif speech.is_to(self._scene.robot):
-            self._conversation.speaks(at, speech.confidence, beside=speech.is_beside)
+        else:
+            self._tell(speech)
+
+    def _tell(self, speech: OwnSpeech) -> None:
+        """Tell the conversation of a speech, if it is for the robot."""
+        if speech.is_to(self._scene.robot):
+            speech.is_heard = True
+            self._conversation.speaks(speech.part, beside=speech.is_beside)
 
     def _decide(self, speech: OwnSpeech, at: Seconds) -> None:
         """Decide what the sound is, by what is known: nothing, if it is over and has no words; else to whom it is."""
@@ -393,8 +391,6 @@ class Talk(KindRecognizer):
             self._writer.decide_interjection(self.id, speech.since, "noise", at)
         elif speech.to is None:
             self._address(speech, to, at)
-        if not (says_words(speech.words) or speech.is_to(self._scene.robot)):
-            self._wordless[speech.since] = speech
 
     def _likely(self, speech: OwnSpeech, at: Seconds) -> Addressees:
         """Addressees of a speech by what is likely."""
@@ -430,8 +426,8 @@ class Talk(KindRecognizer):
             self._line.popleft()
             if not isinstance(item, OwnSpeech):
                 item(self._conversation)
-            elif item.is_to(self._scene.robot):
-                self._conversation.speaks(at, item.confidence, beside=item.is_beside)
+            else:
+                self._tell(item)
         if not self._line:
             self._asked_in_line = inf
 
