@@ -13,10 +13,13 @@ LATE_HEAD = 0.6
 class Drawing:
     """A timeline that is drawn. grid: all times are multiples of it, so that many are the same."""
 
+    SIZES: tuple[int, ...] = (1, 1, 2, 3, 4, 5)
+    """Numbers of people."""
+
     def __init__(self, seed: int) -> None:
         self._chance = chance = random.Random(seed)
         self._grid = chance.choice((0.001, 0.1, 0.1))
-        self.timeline = Timeline(NAMES[: chance.choice((1, 1, 2, 3, 4, 5))], is_worded=chance.random() < 0.5)
+        self.timeline = Timeline(NAMES[: chance.choice(self.SIZES)], is_worded=chance.random() < 0.5)
         if len(self.timeline.people) > 1:
             self.timeline.tells = chance.choice(("early", "late", ""))
             self.timeline.is_worded |= bool(self.timeline.tells)
@@ -113,17 +116,22 @@ class Drawing:
             until = (last[0], last[1] + 1)
             if kind == "asks" and chance.random() < 0.3:
                 until = max(until, self._at(last[0] + self._between(0.0, 0.5)))
-            if not self._is_away(to, at - 2.5, until[0] + 0.1):
-                turn = Turn(f"turn{len(self.timeline.turns)}", kind, to, speech, until)
+            asked = self._asked(to, kind, at, until[0])
+            if asked:
+                turn = Turn(f"turn{len(self.timeline.turns)}", kind, asked, speech, until)
                 turn.is_aborted = kind == "asks" and chance.random() < 0.15
                 if turn.is_aborted and len(self.timeline.people) > 1:  # words after the cut: it depends on what waits
                     for one in spoken:
-                        if one.who == to and one.known is not None and one.until <= until <= one.known:
+                        if one.who in asked and one.known is not None and one.until <= until <= one.known:
                             one.known = one.until[0], one.until[1] + 1
                 self.timeline.turns.append(turn)
                 if self.timeline.is_worded and not turn.is_aborted:
                     self._draw_late_words(turn)
             at = until[0] + chance.choice((self._between(0.2, 2.0), self._between(0.5, 9.0)))
+
+    def _asked(self, to: str, kind: str, at: float, until: float) -> tuple[str, ...]:
+        """To whom a turn of this kind is: to this person, if that is there."""
+        return () if self._is_away(to, at - 2.5, until + 0.1) else (to,)
 
     def _draw_late_words(self, turn: Turn) -> None:
         """Let words of what is said into the robot's words come when it has been decided that there are none.

@@ -58,7 +58,7 @@ def ended(timeline: Timeline) -> Iterator[Said]:
         yield STRANGER, *SAID_BEFORE, (ROBOT,)
     for turn in timeline.turns:
         for since, until in turn.speech:
-            yield ROBOT, round(since[0], 5), round(until[0], 5), (turn.to,)
+            yield ROBOT, round(since[0], 5), round(until[0], 5), tuple(sorted(turn.to))
     for one in timeline.spans:
         if one.action == "speak" and one.to and not is_noise(one, timeline):
             yield one.who, round(one.since[0], 5), round(one.until[0], 5), (one.to,)
@@ -70,7 +70,7 @@ def is_noise(one: Span, timeline: Timeline) -> bool:
         return False
     longest, wait = longest_sound(timeline), one.until[0] + WORDS_AFTER
     for turn in timeline.turns:
-        for since, until in [*turn.speech, *([(turn.since, turn.until)] if turn.to == one.who else [])]:
+        for since, until in [*turn.speech, *([(turn.since, turn.until)] if one.who in turn.to else [])]:
             if one.to == ROBOT and since < one.since < until:
                 if until < one.until:
                     return False
@@ -93,7 +93,7 @@ def has_spoken_since(one: Span, timeline: Timeline) -> bool:
         if each.who == one.who and each.action == "speak" and each.to == ROBOT and one.since < each.since < one.known
         and not is_noise(each, timeline)
     ]  # fmt: skip
-    robots = [since for turn in timeline.turns if turn.to == one.who for since, _ in turn.speech]
+    robots = [since for turn in timeline.turns if one.who in turn.to for since, _ in turn.speech]
     return any(one.since < since < one.known for since in (*own, *robots))
 
 

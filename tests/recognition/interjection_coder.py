@@ -72,10 +72,10 @@ def _into(timeline: Timeline) -> Iterator[Into]:
     for speech in timeline.spans:
         if speech.action == "speak" and speech.to == ROBOT:
             for turn in timeline.turns:
-                if turn.to == speech.who and turn.since < speech.since < turn.until:
+                if speech.who in turn.to and turn.since < speech.since < turn.until:
                     yield Into(speech, turn, turn.until, is_beside=False)
                 for since, until in turn.speech:
-                    if turn.to != speech.who and since < speech.since < until:
+                    if speech.who not in turn.to and since < speech.since < until:
                         yield Into(speech, turn, until, is_beside=True)
 
 

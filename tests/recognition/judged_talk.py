@@ -2,6 +2,7 @@
 
 from tests.recognition import floor_coder, interjection_coder
 from tests.recognition.coder import Coder, as_told, only_one_has, rounded
+from tests.recognition.company_drawing import CompanyDrawing
 from tests.recognition.drawing import Drawing
 from tests.recognition.timeline import Timeline
 
@@ -9,6 +10,11 @@ from tests.recognition.timeline import Timeline
 def differences(seed: int) -> tuple[int, list[str]]:
     """Number of events of a drawn timeline, and what only one of recognition and the coders has."""
     return judged(Drawing(seed).timeline)
+
+
+def in_company(seed: int) -> tuple[int, list[str]]:
+    """Number of events of drawn company, and what only one of recognition and the coders has."""
+    return judged(CompanyDrawing(seed).timeline)
 
 
 def judged(timeline: Timeline) -> tuple[int, list[str]]:

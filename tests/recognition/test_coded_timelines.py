@@ -13,6 +13,7 @@ from tests.recognition import gaze_coder, judged_talk, party_timeline
 Differences = Callable[[int], tuple[int, list[str]]]
 JUDGES: dict[str, tuple[Differences, int]] = {
     "talk": (judged_talk.differences, 1000),
+    "company": (judged_talk.in_company, 600),
     "looks": (gaze_coder.differences, 1000),
     "parties": (party_timeline.differences, 60),
 }

@@ -45,14 +45,14 @@ class Span(Struct):
 
 
 class Turn(Struct):
-    """The robot's words to one person. kind: `asks` opens a pair, `replies` answers one.
+    """The robot's words to one person or several. kind: `asks` opens a pair with each, `replies` answers.
 
     speech: when it speaks; of a turn that asks `until` is its end, after the last word.
     """
 
     id: str
     kind: str
-    to: str
+    to: tuple[str, ...]
     speech: list[tuple[Instant, Instant]]
     until: Instant
     is_aborted: bool = False
@@ -137,7 +137,8 @@ def _of_turn(log: HeardLog, turn: Turn) -> Iterator[tuple[Instant, int, Callable
     (at, _), (over, _) = turn.since, turn.until
 
     def signal(kind: str, when: float) -> None:
-        signaled = TurnSignal(id="e", turn=turn.id, signal=kind, actor=turn.to)  # type: ignore[arg-type]
+        to = turn.to[0] if len(turn.to) == 1 else ""
+        signaled = TurnSignal(id="e", turn=turn.id, signal=kind, actor=to)  # type: ignore[arg-type]
         log.take(SignalTurn(id=f"{turn.id}/{kind}", requester="realizer", signal=signaled, at=stamp(when),
                             block=turn.id), when)  # fmt: skip
 
@@ -146,8 +147,9 @@ def _of_turn(log: HeardLog, turn: Turn) -> Iterator[tuple[Instant, int, Callable
     else:
         kind = "adjacency_pair" if turn.kind == "asks" else "backchannel"
         name = turn.id if turn.kind == "asks" else ""
-        asked = request_event(kind, at, request=turn.id, block=turn.id, turn=name, responder=turn.to)
-        yield turn.since, 0, lambda: log.take(asked, at)
+        for one in turn.to:
+            asked = request_event(kind, at, request=f"{turn.id}/{one}", block=turn.id, turn=name, responder=one)
+            yield turn.since, 0, lambda asked=asked: log.take(asked, at)
     for since, until in turn.speech:
         yield since, 1, lambda since=since: log.begins(ROBOT, "speak", since[0], behavior=f"{turn.id}:s")
         yield until, 0, lambda until=until: log.ends(ROBOT, "speak", until[0], behavior=f"{turn.id}:s")
