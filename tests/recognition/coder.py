@@ -386,7 +386,7 @@ class Coder:
             turn = side.asked
             self._pair_of(turn, side, "succeeded", delay=at - turn.until[0])
             for other in self._sides.values():
-                if other is not side and other.asked is turn:
+                if other is not side and other.asked is turn and not self._begins_too(other, sign):
                     self._is_answered(other, turn, "succeeded", sign)
             side.asked, side.answers_until, side.third_until = None, sign.until, -1.0
         elif sign.action == "speak" and (asked := self._asked_of_another(side, sign)) is not None:
@@ -403,6 +403,14 @@ class Coder:
                 side.third_until = -1.0
             else:
                 side.own.append(sign)
+
+    def _begins_too(self, side: Side, sign: Span) -> bool:
+        """True if a person begins to answer in the very instant of another's sign."""
+        signs = [each for each in self._timeline.spans if each.who == side.person and each.to == ROBOT]
+        return any(
+            each.action not in ("look", "act") and each.since[0] == sign.since[0] and not self._is_noise(each)
+            for each in signs
+        )
 
     def _has_spoken(self, asked: Turn, sign: Span) -> bool:
         """True if the robot has begun to say anything, to anybody, after nobody had answered this turn in time."""

@@ -85,7 +85,9 @@ def _reading(one: Into, timeline: Timeline) -> set[str]:
     since, until, over = speech.since[0], speech.until[0], one.until[0]
     by_words = "backchannel" if speech.words in LISTENING else "interruption"
     outlasts = speech.until > one.until
-    taken = {"answer", "interruption"} if turn.is_aborted or one.is_beside else {"answer"}
+    # In company it may wait until it is known to whom it is, and then has its words.
+    is_waiting = len(timeline.people) > 1 and speech.words not in LISTENING
+    taken = {"answer", "interruption"} if turn.is_aborted or one.is_beside or is_waiting else {"answer"}
     if not timeline.is_worded:
         longest = BRIEF + ROUND
         if speech.seconds > longest and since + longest < over:
