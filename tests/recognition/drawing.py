@@ -65,7 +65,7 @@ class Drawing:
         if until[0] - since[0] < 0.1:
             return
         since = since[0], NAMES.index(person)  # who is observed first of two that begin together, does not matter
-        one = Span(person, "speak", since, until, to)
+        one = Span(person, "speak", since, until, to, told=to if self.timeline.tells else "")
         if self.timeline.is_worded and chance.random() < 0.8:
             one.words = chance.choice((*LISTENING, *OTHER) if one.seconds < 2.5 else OTHER)
             is_alone = len(self.timeline.people) == 1

@@ -104,7 +104,11 @@ def _reading(one: Into, timeline: Timeline) -> set[str]:
         return {"answer", by_words if known is not None and known[0] <= wait else "noise"}
     if known is not None and (not outlasts or known < one.until):
         heard = max(wait, until + WORDS_AFTER) if one.is_beside else wait
-        is_in_time = known[0] <= heard and not has_spoken_since(speech, timeline)
+        is_in_time = known[0] <= heard
+        if one.is_beside and one.until < known and is_in_time and by_words != "backchannel":
+            return taken
+        if is_in_time and has_spoken_since(speech, timeline):  # waited for only if it is not known to whom it is
+            return {"noise", by_words, *taken}
         may_correct = turn.kind == "asks" or speech.seconds <= WORDS_WAIT + ROUND  # else it has opened a pair
         if is_in_time or (not one.is_beside and known < turn.until and may_correct):
             return {by_words}

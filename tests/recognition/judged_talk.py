@@ -1,6 +1,7 @@
 """Drawn talk, judged: what is told of its events, its floor and its interjections, beside what coders write down."""
 
 from tests.recognition import floor_coder, interjection_coder
+from tests.recognition.addressee_coder import addressed
 from tests.recognition.coder import Coder, as_told, only_one_has, rounded
 from tests.recognition.company_drawing import CompanyDrawing
 from tests.recognition.drawing import Drawing
@@ -14,7 +15,7 @@ def differences(seed: int) -> tuple[int, list[str]]:
 
 def in_company(seed: int) -> tuple[int, list[str]]:
     """Number of events of drawn company, and what only one of recognition and the coders has."""
-    return judged(CompanyDrawing(seed).timeline)
+    return judged(addressed(CompanyDrawing(seed).timeline))
 
 
 def judged(timeline: Timeline) -> tuple[int, list[str]]:

@@ -7,14 +7,18 @@ time is observed. `Timeline.told` plays it to recognition; `coder.py` says what 
 from collections.abc import Callable, Iterator
 
 from msgspec import Struct, field
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Action, TurnSignal
 from engage_hri.schemas.perception import ActorLost
 from engage_hri.schemas.recognition import SignalTurn
+from engage_hri.schemas.world import World
 from tests.recognition.heard_log import HeardLog
 from tests.recognition.observations import PIECES, ROBOT, request_event, stamp, world
 
 NAMES = ("ann", "bob", "cy", "dee", "eve")
+CALLED = {"cy": "マリ", "dee": "Mary Ann"}
+"""By what name people are called beside their ids."""
 STRANGER = "zed"
 SAID_BEFORE = -59.0, -58.0
 """What somebody says before all else, where words are told."""
@@ -26,9 +30,9 @@ OTHER = ("stop", "what about the red one", "nein warte")
 
 
 class Span(Struct):
-    """What somebody does. to: for whom it is; of a look, what it is at. words: "": none.
+    """What somebody does. to: for whom it is; of a look, what it is at; "": nobody. words: "": none.
 
-    known: when the words are told; None: never.
+    known: when the words are told; None: never. told: for whom it is by perception; "": it does not say.
     """
 
     who: str
@@ -38,6 +42,7 @@ class Span(Struct):
     to: str = ROBOT
     words: str = ""
     known: Instant | None = None
+    told: str = ""
 
     @property
     def seconds(self) -> float:
@@ -83,7 +88,7 @@ class Timeline(Struct):
     def told(self) -> HeardLog:
         """All that recognition tells of it."""
         log = HeardLog(LIMIT)
-        log.take(world(*self.people, *((STRANGER,) if self.is_worded else ())), -60.0)
+        log.take(_room(*self.people, *((STRANGER,) if self.is_worded else ())), -60.0)
         if self.is_worded:
             self._has_spoken(log)
         for (at, _), _, step in sorted(self._steps(log), key=lambda each: each[:2]):
@@ -100,7 +105,7 @@ class Timeline(Struct):
             (SAID_BEFORE[0], lambda at: log.begins(STRANGER, "speak", at)),
             (SAID_BEFORE[1], lambda at: log.ends(STRANGER, "speak", at)),
             (-57.9, lambda at: log.hears(STRANGER, *SAID_BEFORE, "so", at, to=to)),
-            (-40.0, lambda at: log.take(world(*self.people), at)),
+            (-40.0, lambda at: log.take(_room(*self.people), at)),
             (-40.0, lambda at: log.take(ActorLost(actor=STRANGER, at=stamp(at), left=True), at)),
         ]  # fmt: skip
         for at, step in steps:
@@ -119,15 +124,22 @@ class Timeline(Struct):
             yield each.until, 0, lambda each=each: log.found(each.who, each.until[0])
 
 
+def _room(*people: str) -> World:
+    """The world with these people and their names."""
+    seen = world(*people)
+    entities = (replace(each, name=CALLED.get(each.id, "")) for each in seen.entities)
+    return replace(seen, entities=tuple(entities))
+
+
 def _of_span(log: HeardLog, one: Span, timeline: Timeline) -> Iterator[tuple[Instant, int, Callable[[], object]]]:
     target = one.to if one.action == "look" else PIECES[0] if one.action == "point" else ""
     since, until = one.since[0], one.until[0]
     yield one.since, 1, lambda: log.begins(one.who, one.action, since, target)
     yield one.until, 0, lambda: log.ends(one.who, one.action, until, target)
-    if one.action == "speak" and (one.known is not None or timeline.tells):
+    if one.action == "speak" and (one.known is not None or one.told):
         known = one.known or one.until
-        to = frozenset((one.to,)) if timeline.tells else None
-        if timeline.tells == "early":
+        to = frozenset((one.told,)) if one.told else None
+        if timeline.tells == "early" and one.told:
             yield one.since, 2, lambda: log.hears(one.who, since, until, "", since, to=to, final=False)
         if one.known is not None or timeline.tells == "late":
             yield known, 1, lambda: log.hears(one.who, since, until, one.words, known[0], to=to)
