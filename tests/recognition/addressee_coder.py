@@ -59,7 +59,9 @@ def _held_at(speech: Span, before: Timeline) -> float:
     """When a speech into the robot's turn that goes on is an interruption or the answer, by the look at the robot."""
     for turn in before.turns:
         if speech.who in turn.to and turn.since < speech.since < turn.until:
-            decided = min(turn.until[0], speech.since[0] + (WORDS_WAIT if before.is_worded else BRIEF))
+            decided = speech.since[0] + WORDS_WAIT
+            if not before.is_worded:
+                decided = min(turn.until[0], speech.since[0] + BRIEF)
             faces = {
                 each.to for each in before.spans
                 if each.who == speech.who and each.action == "look"

@@ -37,7 +37,7 @@ class CompanyDrawing(Drawing):
         one.told = to if tells and not (is_unsure and chance.random() < 0.3) else ""
         if self.timeline.is_worded and chance.random() < (0.95 if tells else 0.8):
             one.words = self._words(one, is_unsure=is_unsure)
-            late = chance.choice((0.0, 0.1, self._between(0.0, 0.8))) if one.seconds < 1.3 else 0.0
+            late = chance.choice((0.0, 0.1, self._between(0.0, 1.3 - one.seconds))) if one.seconds < 1.3 else 0.0
             one.known = max(self._at(until[0] + late), (until[0], until[1] + 1))
         self.timeline.spans.append(one)
         target = chance.choice((to, "", *people)) if is_unsure else to
