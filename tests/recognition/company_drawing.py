@@ -1,0 +1,72 @@
+"""Talk of two to five people and a robot that speaks to one, several or all of them, drawn at random.
+
+Looks, words and what perception tells contradict each other now and then: people look at a neighbor while they say
+the robot's name, at nobody while they answer, and talk about who is there.
+"""
+
+from tests.recognition.drawing import LATE_HEAD, Drawing
+from tests.recognition.observations import ROBOT
+from tests.recognition.timeline import CALLED, LISTENING, NAMES, OTHER, Span
+
+CALLS = (
+    "{}, {}", "{} {}", "{1}, {0}", "stop {0}", "{1}, {0}!",
+    "{0}、見て", "赤いのを取って、{0}。", "{0}、赤いのを取って。",
+)  # fmt: skip
+"""Words that call somebody, and say something."""
+MENTIONS = (
+    "I think {0} has the red one", "that is what I have told {0}", "look, {0} has it there",
+    "赤いのを取って。でも、これもいい。それは{0}",
+)  # fmt: skip
+"""Words about somebody."""
+LONGEST_UNSURE = 2.5
+"""Longest speech, in seconds, of which words and looks contradict each other: nobody decides before it is over."""
+
+
+class CompanyDrawing(Drawing):
+    """A timeline of company."""
+
+    SIZES = (2, 3, 4, 5)
+
+    def _speak(self, person: str, to: str, at: float, lasts: float) -> None:
+        chance, since, until = self._chance, self._at(at), self._at(at + lasts)
+        if until[0] - since[0] < 0.1:
+            return
+        is_unsure = until[0] - since[0] < LONGEST_UNSURE and chance.random() < 0.4
+        one = Span(person, "speak", (since[0], NAMES.index(person)), until, to)
+        tells, people = self.timeline.tells, [ROBOT, *self.timeline.people]
+        one.told = to if tells and not (is_unsure and chance.random() < 0.3) else ""
+        if self.timeline.is_worded and chance.random() < (0.95 if tells else 0.8):
+            one.words = self._words(one, is_unsure=is_unsure)
+            late = chance.choice((0.0, 0.1, self._between(0.0, 0.8))) if one.seconds < 1.3 else 0.0
+            one.known = max(self._at(until[0] + late), (until[0], until[1] + 1))
+        self.timeline.spans.append(one)
+        target = chance.choice((to, "", *people)) if is_unsure else to
+        if target in ("", person):
+            return
+        turns = since[0] + chance.choice((-0.05, self._between(0.0, min(LATE_HEAD, 0.45 * one.seconds))))
+        self.timeline.spans.append(Span(person, "look", (round(turns, 6), 0), (round(until[0] + 0.05, 6), 0), target))
+
+    def _words(self, one: Span, *, is_unsure: bool) -> str:
+        chance = self._chance
+        if not is_unsure or chance.random() < 0.4:
+            return chance.choice((*LISTENING, *OTHER) if one.seconds < LONGEST_UNSURE else OTHER)
+        who = chance.choice([each for each in (ROBOT, *self.timeline.people) if each != one.who])
+        name = chance.choice((who, who.title(), CALLED.get(who, who)))
+        return chance.choice((*CALLS, *MENTIONS)).format(name, chance.choice(OTHER))
+
+    def _gesture(self, person: str, since: float, until: float) -> None:
+        spoken = [each for each in self.timeline.spans if each.who == person and each.action in ("speak", "look")][
+            -2:
+        ]
+        if spoken and spoken[-1].action == "look" and spoken[-1].to == ROBOT and spoken[-1].until[0] > until:
+            super()._gesture(person, max(since, spoken[-1].since[0] + 0.01), until)
+
+    def _asked(self, to: str, kind: str, at: float, until: float) -> tuple[str, ...]:
+        here = [each for each in self.timeline.people if not self._is_away(each, at - 2.5, until + 0.1)]
+        if kind != "asks" or to not in here or self._chance.random() < 0.4:
+            return super()._asked(to, kind, at, until)
+        others = [each for each in here if each != to]
+        return (
+            to,
+            *self._chance.sample(others, self._chance.choice((len(others), self._chance.randint(0, len(others))))),
+        )
