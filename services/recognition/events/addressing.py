@@ -24,6 +24,7 @@ It is a cough, or a laugh at what a neighbor says.
 
 import re
 from collections.abc import Iterable, Mapping
+from math import inf
 
 from msgspec import Struct, field
 
@@ -51,6 +52,11 @@ WHOEVER: Addressees = frozenset(("",))
 """Of a speech of the robot of which nobody has said to whom it is."""
 
 
+def renamed_in(to: Addressees, other: str, kept: str) -> Addressees:
+    """Addressees with a person's present id in place of another of theirs."""
+    return to - {other} | {kept} if other in to else to
+
+
 class Spoken(Struct, kw_only=True):
     """A speech. to: its addressees; None: they are not known yet. until: None: it goes on."""
 
@@ -72,6 +78,10 @@ class Spoken(Struct, kw_only=True):
 
     def is_to(self, actor: str) -> bool:
         return self.to is WHOEVER or (self.to is not None and actor in self.to)
+
+    def overlaps(self, since: Seconds, until: Seconds | None = None) -> bool:
+        """True if the speech and this time have more than an instant in common. until: None: it goes on."""
+        return since < (inf if self.until is None else self.until) and self.since < (inf if until is None else until)
 
 
 class FaceTimes(Struct):

@@ -5,7 +5,7 @@ Guards are part of the input's name (`robot_directs_shared`), so that table and 
 """
 
 from collections.abc import Mapping
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -257,6 +257,20 @@ class EventWriter:
         """End the open events with `person` as lost."""
         for event in [event for event in self._open.values() if person in (event.initiator, event.responder)]:
             self.publish(event, "lost", at)
+
+    def join(self, other: str, kept: str) -> None:
+        """Take what a person has said by another id as theirs."""
+
+        def named(speech: SpeechStart) -> SpeechStart:
+            return SpeechStart(kept, speech.since) if speech.actor == other else speech
+
+        for remembered in (self._texts, self._interjected):
+            for speech in [each for each in remembered if each.actor == other]:
+                told: Any = remembered.pop(speech)
+                if named(speech) not in remembered:
+                    remembered[named(speech)] = told
+        for event, _ in self._spoken.values():
+            event.spoken = tuple(map(named, event.spoken))
 
     def answer(self, request: str, event: str, at: Seconds) -> None:
         """Answer a request with an event that has been published already."""

@@ -99,21 +99,26 @@ class People:
         self._writer.effects.append(PersonForgotten(id))
         self._follow(now)
 
-    def join(self, other: str, kept: str, at: Seconds) -> None:
-        """Take two persons for one, who is `kept` from now on. What is open with the other is lost."""
+    def join(self, other: str, kept: str, at: Seconds, *, speaks: bool) -> None:
+        """Take two persons for one, who is `kept` from now on.
+
+        What is open with the other is lost, but for what they have said and is not decided. speaks: they go on.
+        """
         before = self.persons.get(other)
         if before is None:
             return
+        self._scene.join(other, kept)
+        self._writer.join(other, kept)
         self.lose_track(before, at)
         is_found = before.presence.here and before.presence.reported
         self._drop(other, at, at)
         self._contacts.pop(kept, None)  # what was told of the other may be taken for it
-        self._scene.join(other, kept)
         gazes = [self._scene.gaze, *(person.gaze for person in self.persons.values())]
         for gaze in gazes:
             gaze.targets = tuple(kept if target == other else target for target in gaze.targets)
         if is_found:
             self.observe(kept, at, lambda person: person.presence.found(at))
+        self.observe(kept, at, lambda person: person.talk.take_over(before.talk, at, goes_on=speaks))
 
     def lose_track(self, person: PersonRecognition, at: Seconds) -> None:
         """Begin anew with a person: its open events end as lost, and its actions have to be observed again."""

@@ -23,7 +23,7 @@ from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.addressing import WHOEVER, WORDS_AFTER, Addressees, Spoken
+from engage_hri.services.recognition.events.addressing import WHOEVER, WORDS_AFTER, Addressees, Spoken, renamed_in
 from engage_hri.services.recognition.events.exchange import TURN_PATIENCE
 from engage_hri.services.recognition.events.history import ActionHistory, Latest
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock, anchor
@@ -223,9 +223,16 @@ class Session:
             self._lose_untold(person, at)
         return self._take()
 
-    def join(self, other: str, kept: str, at: Seconds) -> list[Effect]:
-        """Take two persons for one, who is `kept` from now on. What is open with the other is lost."""
-        self._people.join(other, kept, at)
+    def join(self, other: str, kept: str, at: Seconds, *, speaks: bool = False) -> list[Effect]:
+        """Take two persons for one, who is `kept` from now on. speaks: what the other says goes on.
+
+        What is open with the other is lost, but for what they have said and is not decided.
+        """
+        for block, to in tuple(self._addressed.items()):
+            self._addressed[block] = renamed_in(to, other, kept)
+        if self._turn is not None:
+            self._turn = self._turn[0], renamed_in(self._turn[1], other, kept)
+        self._people.join(other, kept, at, speaks=speaks)
         self._lose_untold(other, at)
         return self._take()
 

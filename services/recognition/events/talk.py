@@ -187,7 +187,12 @@ class Talk(KindRecognizer):
     def goes_on(self, action: Action, since: Seconds, at: Seconds, confidence: Probability, face: str) -> None:
         """Take an action that goes on, known only now, at `at`. It has been decided by the looks of now to whom."""
         part = SignPart(action, since, confidence)
-        if action == "speak":
+        if action == "speak" and any(each.overlaps(since) for each in self._speeches.values()):
+            known = self.speech  # it has been told by another id of the person
+            if known is None or not known.is_heard:
+                return
+            part = known.part
+        elif action == "speak":
             speech = self._own_speech(since, confidence, face)
             if not self._find(speech, at):
                 self._address(speech, self._likely(speech, at), at)
@@ -232,9 +237,49 @@ class Talk(KindRecognizer):
         self.speech = None
         for speech in self._undecided:
             self._decide(speech, at)
-        self._speeches.clear()
         self.go_on(at)
-        self._take_in_order(at, lambda talk: talk.person_gone(at, until))
+        self._take_in_order(at, lambda talk: self._is_gone(talk, at, until))
+
+    def _is_gone(self, talk: Conversation, at: Seconds, until: Seconds) -> None:
+        talk.person_gone(at, until)
+        self._speeches.clear()
+
+    def take_over(self, other: "Talk", at: Seconds, *, goes_on: bool) -> None:
+        """Take what the person has said by another id; what is not decided of it is decided here.
+
+        goes_on: what they say by that id goes on. What both ids have said at one time, two reporters have told.
+        """
+        self.person_back()
+        for speech in sorted(other._speeches.values(), key=lambda each: each.since):
+            is_open = other._is_open(speech)
+            speech.actor = self.id
+            if speech.until is None and not goes_on:
+                speech.until = at
+            if any(each.overlaps(speech.since, speech.until) for each in self._speeches.values()):
+                self._scene.forget_spoken(speech)
+                if is_open and speech.since not in self._speeches:
+                    self._writer.decide_interjection(self.id, speech.since, "noise", at)
+                continue
+            self._speeches[speech.since] = speech
+            self.speech = speech if speech.until is None else self.speech
+            if is_open:
+                self._begin_again(speech)
+        self.go_on(at)
+
+    def _is_open(self, speech: OwnSpeech) -> bool:
+        """True if a speech is not decided."""
+        sign = self._conversation.listener.sign
+        is_in_line = any(each is speech for _, each in self._line)
+        return is_in_line or (sign is not None and any(part is speech.part for part in sign.parts))
+
+    def _begin_again(self, speech: OwnSpeech) -> None:
+        """Put a speech in line, in its place."""
+        since, until, speech.is_heard = speech.since, speech.until, False
+        speech.part = SignPart("speak", since, speech.part.confidence)
+        self._line.insert(sum(at <= since for at, _ in self._line), (since, speech))
+        if until is not None:
+            step = lambda talk: talk.falls_silent(until) if speech.is_to(self._scene.robot) else None  # noqa: E731
+            self._line.insert(sum(at <= until for at, _ in self._line), (until, step))
 
     def person_back(self) -> None:
         """Take the person's return: the robot may be speaking, or may have fallen silent meanwhile."""
