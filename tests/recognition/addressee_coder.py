@@ -31,11 +31,18 @@ def addressee(speech: Span, before: Timeline) -> str:
     is_decided = speech.known is not None and _held_at(speech, before) <= speech.known[0]
     if speech.told and (before.tells == "early" or not is_decided):
         return speech.told
-    if not is_decided and (called := called_by(speech.words, (ROBOT, *before.people))):
+    if not is_decided and (called := called_by(speech.words, _known_by_name(speech, before))):
         return called
     if not _company(speech, before):
         return ROBOT
     return _looked_at(speech, before) or _answered(speech, before)
+
+
+def _known_by_name(speech: Span, before: Timeline) -> tuple[str, ...]:
+    """Whom words can call: not who is known by another id alone when they come."""
+    at = speech.known or speech.since
+    unknown = {each.who for each in before.joins if at < each.at and not (each.is_known or each.changes)}
+    return (ROBOT, *(each for each in before.people if each not in unknown))
 
 
 def called_by(words: str, people: tuple[str, ...]) -> str:

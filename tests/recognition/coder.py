@@ -447,7 +447,7 @@ def as_told(events: Sequence[ConnectionEvent]) -> list[Coded]:
         if each.kind not in ("adjacency_pair", "backchannel"):
             continue
         state = "completed" if each.kind == "backchannel" else each.state
-        is_late = each.retold and each.state == "failed"
+        is_late = each.retold and each.state == "failed" and each.response is not None
         if before is not None and before.state != "started" and not is_late:
             continue
         late = each.delay if is_late else None

@@ -6,7 +6,7 @@ the robot's name, at nobody while they answer, and talk about who is there.
 
 from tests.recognition.drawing import LATE_HEAD, Drawing
 from tests.recognition.observations import ROBOT
-from tests.recognition.timeline import CALLED, LISTENING, NAMES, OTHER, Span
+from tests.recognition.timeline import CALLED, LISTENING, NAMES, OTHER, Join, Span
 
 CALLS = (
     "{}, {}", "{} {}", "{1}, {0}", "stop {0}", "{1}, {0}!",
@@ -70,3 +70,35 @@ class CompanyDrawing(Drawing):
             to,
             *self._chance.sample(others, self._chance.choice((len(others), self._chance.randint(0, len(others))))),
         )
+
+
+class JoinDrawing(CompanyDrawing):
+    """A timeline of company in which people turn out to be somebody who is known: by another id."""
+
+    def __init__(self, seed: int) -> None:
+        super().__init__(seed)
+        away = {each.who for each in self.timeline.away}
+        people = [each for each in self.timeline.people if each not in away and each not in CALLED]
+        for number, who in enumerate(self._chance.sample(people, min(len(people), self._chance.choice((1, 1, 2))))):
+            self._draw_join(who, f"face_{number}")
+
+    def _draw_join(self, who: str, id: str) -> None:
+        """Draw when it becomes known: at any time, or in the very instant in which somebody begins or ends."""
+        chance = self._chance
+        instants = [at for each in self.timeline.spans for at in (each.since, each.until)]
+        instants += [at for turn in self.timeline.turns for speech in turn.speech for at in speech]
+        at = chance.choice(
+            (self._at(self._between(1.0, self._end)), (chance.choice(instants)[0], chance.choice((-2, 10**7))))
+        )
+        kind = chance.choice(("named", "changed", "known"))
+        join = Join(who, id, at, is_known=kind == "known" and not self.timeline.away, goes_on=chance.random() < 0.5)
+        if kind == "changed":
+            join.changes, join.goes_on = (at[0], -3), True
+            join.at = self._at(at[0] + self._between(0.1, 1.5))
+            if any(
+                each.since[0] <= join.at[0] + 0.2 and at[0] - 0.4 <= each.until[0]
+                for each in self.timeline.spans
+                if each.who == who
+            ):
+                return
+        self.timeline.joins.append(join)

@@ -14,6 +14,7 @@ Differences = Callable[[int], tuple[int, list[str]]]
 JUDGES: dict[str, tuple[Differences, int]] = {
     "talk": (judged_talk.differences, 1000),
     "company": (judged_talk.in_company, 600),
+    "joins": (judged_talk.with_joins, 600),
     "looks": (gaze_coder.differences, 1000),
     "parties": (party_timeline.differences, 60),
 }

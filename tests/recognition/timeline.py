@@ -75,6 +75,21 @@ class Absence(Struct):
     until: Instant
 
 
+class Join(Struct):
+    """Somebody is told of by another id until it becomes known who it is.
+
+    is_known: the person is known by the own id, too, for as long. goes_on: the other id is told further on.
+    changes: when the id changes; until then it is the own one. None: it does not.
+    """
+
+    who: str
+    id: str
+    at: Instant
+    is_known: bool = False
+    goes_on: bool = False
+    changes: Instant | None = None
+
+
 class Timeline(Struct):
     """All that happens. is_worded: recognizers tell words. tells: "": nobody tells to whom people speak."""
 
@@ -84,20 +99,24 @@ class Timeline(Struct):
     away: list[Absence] = field(default_factory=list)
     is_worded: bool = False
     tells: str = ""
+    joins: list[Join] = field(default_factory=list)
 
     def told(self) -> HeardLog:
         """All that recognition tells of it."""
         log = HeardLog(LIMIT)
-        log.take(_room(*self.people, *((STRANGER,) if self.is_worded else ())), -60.0)
+        log.ids = {each.who: each.id for each in self.joins if each.changes is None}
+        log.owners = {each.id: each.who for each in self.joins}
+        known = [each.who for each in self.joins if each.is_known]
+        log.take(_room(*map(log.id, self.people), *known, *((STRANGER,) if self.is_worded else ())), -60.0)
         if self.is_worded:
-            self._has_spoken(log)
+            self._has_spoken(log, known)
         for (at, _), _, step in sorted(self._steps(log), key=lambda each: each[:2]):
             log.until(at - 1e-6)
             step()
         log.until(10_000.0)
         return log
 
-    def _has_spoken(self, log: HeardLog) -> None:
+    def _has_spoken(self, log: HeardLog, known: list[str]) -> None:
         """Have somebody say something to the robot, and go: so it is known that words are told, and addressees."""
         to = frozenset((ROBOT,)) if self.tells else None
         steps: list[tuple[float, Callable[[float], None]]] = [
@@ -105,7 +124,7 @@ class Timeline(Struct):
             (SAID_BEFORE[0], lambda at: log.begins(STRANGER, "speak", at)),
             (SAID_BEFORE[1], lambda at: log.ends(STRANGER, "speak", at)),
             (-57.9, lambda at: log.hears(STRANGER, *SAID_BEFORE, "so", at, to=to)),
-            (-40.0, lambda at: log.take(_room(*self.people), at)),
+            (-40.0, lambda at: log.take(_room(*map(log.id, self.people), *known), at)),
             (-40.0, lambda at: log.take(ActorLost(actor=STRANGER, at=stamp(at), left=True), at)),
         ]  # fmt: skip
         for at, step in steps:
@@ -122,6 +141,15 @@ class Timeline(Struct):
         for each in self.away:
             yield each.since, 0, lambda each=each: log.lost(each.who, each.since[0])
             yield each.until, 0, lambda each=each: log.found(each.who, each.until[0])
+        for join in self.joins:
+            yield from _of_join(log, join)
+
+
+def _of_join(log: HeardLog, join: Join) -> Iterator[tuple[Instant, int, Callable[[], object]]]:
+    if (changes := join.changes) is not None:
+        yield changes, 0, lambda: log.lost(join.who, changes[0])
+        yield join.at, 0, lambda: log.ids.update({join.who: join.id})
+    yield join.at, 1, lambda: log.join(join.who, join.at[0], goes_on=join.goes_on)
 
 
 def _room(*people: str) -> World:
@@ -149,7 +177,7 @@ def _of_turn(log: HeardLog, turn: Turn) -> Iterator[tuple[Instant, int, Callable
     (at, _), (over, _) = turn.since, turn.until
 
     def signal(kind: str, when: float) -> None:
-        to = turn.to[0] if len(turn.to) == 1 else ""
+        to = log.id(turn.to[0]) if len(turn.to) == 1 else ""
         signaled = TurnSignal(id="e", turn=turn.id, signal=kind, actor=to)  # type: ignore[arg-type]
         log.take(SignalTurn(id=f"{turn.id}/{kind}", requester="realizer", signal=signaled, at=stamp(when),
                             block=turn.id), when)  # fmt: skip
@@ -160,8 +188,16 @@ def _of_turn(log: HeardLog, turn: Turn) -> Iterator[tuple[Instant, int, Callable
         kind = "adjacency_pair" if turn.kind == "asks" else "backchannel"
         name = turn.id if turn.kind == "asks" else ""
         for one in turn.to:
-            asked = request_event(kind, at, request=f"{turn.id}/{one}", block=turn.id, turn=name, responder=one)
-            yield turn.since, 0, lambda asked=asked: log.take(asked, at)
+            yield (
+                turn.since,
+                0,
+                lambda one=one: log.take(
+                    request_event(
+                        kind, at, request=f"{turn.id}/{one}", block=turn.id, turn=name, responder=log.id(one)
+                    ),
+                    at,
+                ),
+            )
     for since, until in turn.speech:
         yield since, 1, lambda since=since: log.begins(ROBOT, "speak", since[0], behavior=f"{turn.id}:s")
         yield until, 0, lambda until=until: log.ends(ROBOT, "speak", until[0], behavior=f"{turn.id}:s")
