@@ -3,6 +3,7 @@
 Takes nothing from the code that it judges. Definitions: docs/recognition.md, "To whom people speak".
 """
 
+from collections.abc import Collection
 from math import inf
 
 from msgspec.structs import replace
@@ -31,7 +32,7 @@ def addressee(speech: Span, before: Timeline) -> str:
     is_decided = speech.known is not None and _held_at(speech, before) <= speech.known[0]
     if speech.told and (before.tells == "early" or not is_decided):
         return speech.told
-    if not is_decided and (called := called_by(speech.words, _known_by_name(speech, before))):
+    if not is_decided and (called := called_by(speech.words, _known_by_name(speech, before), before.unseen)):
         return called
     if not _company(speech, before):
         return ROBOT
@@ -45,11 +46,14 @@ def _known_by_name(speech: Span, before: Timeline) -> tuple[str, ...]:
     return (ROBOT, *(each for each in before.people if each not in unknown))
 
 
-def called_by(words: str, people: tuple[str, ...]) -> str:
-    """Who is called: first, last after a comma, or last of a few words. A comma parts words where no blank does."""
+def called_by(words: str, people: tuple[str, ...], unseen: Collection[str] = ()) -> str:
+    """Who is called: first, last after a comma, or last of a few words. A comma parts words where no blank does.
+
+    unseen: people of whom only the ids are known.
+    """
     said = [each for each in words.replace("、", ", ").replace("。", ". ").split() if any(map(str.isalnum, each))]
     for who in people:
-        for name in (who, *filter(None, (CALLED.get(who),))):
+        for name in (who, *filter(None, () if who in unseen else (CALLED.get(who),))):
             parts = name.casefold().split()
             plain = [each.strip(",.!?").casefold() for each in said]
             if not plain or len(parts) > len(plain):
@@ -93,7 +97,7 @@ def _looked_at(speech: Span, before: Timeline) -> str:
     """Whose face the speaker looks at for more than half of the speech."""
     seconds: dict[str, float] = {}
     for each in before.spans:
-        if each.who == speech.who and each.action == "look":
+        if each.who == speech.who and each.action == "look" and each.to in (ROBOT, *_company(speech, before)):
             common = min(each.until[0], speech.until[0]) - max(each.since[0], speech.since[0])
             seconds[each.to] = seconds.get(each.to, 0.0) + max(0.0, common)
     return next((face for face, common in seconds.items() if common > HALF * speech.seconds + ROUND), "")

@@ -4,9 +4,11 @@ Looks, words and what perception tells contradict each other now and then: peopl
 the robot's name, at nobody while they answer, and talk about who is there.
 """
 
+import random
+
 from tests.recognition.drawing import LATE_HEAD, Drawing
 from tests.recognition.observations import ROBOT
-from tests.recognition.timeline import CALLED, LISTENING, NAMES, OTHER, Join, Span
+from tests.recognition.timeline import CALLED, LISTENING, NAMES, OTHER, Join, Span, Turn
 
 CALLS = (
     "{}, {}", "{} {}", "{1}, {0}", "stop {0}", "{1}, {0}!",
@@ -27,6 +29,14 @@ class CompanyDrawing(Drawing):
 
     SIZES = (2, 3, 4, 5)
 
+    def __init__(self, seed: int) -> None:
+        self._habits = habits = random.Random(f"{seed} habits")
+        self._blind = {each for each in NAMES if habits.random() < 0.15}
+        """People of whom no look is ever told."""
+        self._silent = {each for each in NAMES[2:] if habits.random() < 0.15}
+        super().__init__(seed)
+        self.timeline.unseen = frozenset(each for each in self.timeline.people if habits.random() < 0.15)
+
     def _speak(self, person: str, to: str, at: float, lasts: float) -> None:
         chance, since, until = self._chance, self._at(at), self._at(at + lasts)
         if until[0] - since[0] < 0.1:
@@ -40,11 +50,27 @@ class CompanyDrawing(Drawing):
             late = chance.choice((0.0, 0.1, self._between(0.0, 1.3 - one.seconds))) if one.seconds < 1.3 else 0.0
             one.known = max(self._at(until[0] + late), (until[0], until[1] + 1))
         self.timeline.spans.append(one)
-        target = chance.choice((to, "", *people)) if is_unsure else to
+        if self.timeline.is_worded:
+            self._hear_partly(one)
+        target = "" if person in self._blind else chance.choice((to, "", *people)) if is_unsure else to
         if target in ("", person):
             return
         turns = since[0] + chance.choice((-0.05, self._between(0.0, min(LATE_HEAD, 0.45 * one.seconds))))
+        if self._habits.random() < 0.3:
+            turns = self._at(turns)[0]
         self.timeline.spans.append(Span(person, "look", (round(turns, 6), 0), (round(until[0] + 0.05, 6), 0), target))
+
+    def _hear_partly(self, one: Span) -> None:
+        """Let partial words come while somebody speaks: any, also names of others than who is called in the end."""
+        habits, step = self._habits, round(0.3 / self._grid) * self._grid
+        for number in range(1, int(one.seconds / 0.3)):
+            if one.words and habits.random() < 0.2:
+                text = habits.choice((one.words.split()[0], "bob", "robot", "stop", "uh"))
+                one.heard = (*one.heard, ((round(one.since[0] + number * step, 6), 3), text))
+
+    def _draw_person(self, person: str) -> None:
+        if person not in self._silent:
+            super()._draw_person(person)
 
     def _words(self, one: Span, *, is_unsure: bool) -> str:
         chance = self._chance
@@ -60,6 +86,10 @@ class CompanyDrawing(Drawing):
         ]
         if spoken and spoken[-1].action == "look" and spoken[-1].to == ROBOT and spoken[-1].until[0] > until:
             super()._gesture(person, max(since, spoken[-1].since[0] + 0.01), until)
+
+    def _draw_late_words(self, turn: Turn) -> None:
+        if len(turn.to) == 1:  # else it depends on when it is known who else has answered
+            super()._draw_late_words(turn)
 
     def _asked(self, to: str, kind: str, at: float, until: float) -> tuple[str, ...]:
         here = [each for each in self.timeline.people if not self._is_away(each, at - 2.5, until + 0.1)]

@@ -58,6 +58,8 @@ def judged(timeline: Timeline, told: list[Interjection]) -> Iterator[str]:
         life = lives.get(key, [])
         coded = _reading(one, timeline)
         last = life[-1].reading if life else ""
+        if one.is_beside and coded == {"noise"}:
+            coded = {"noise", ""}  # it may never be known to whom it is
         if last not in coded:
             yield f"{key[0]} at {key[1]}{' beside' * one.is_beside}: told {last!r}, coded {sorted(coded)}"
         elif not one.is_beside and (life[0].reading, life[0].at.seconds > key[1] + SETTLED) != ("open", False):

@@ -43,6 +43,8 @@ class Span(Struct):
     words: str = ""
     known: Instant | None = None
     told: str = ""
+    heard: tuple[tuple[Instant, str], ...] = ()
+    """Partial words, which change nothing."""
 
     @property
     def seconds(self) -> float:
@@ -100,23 +102,28 @@ class Timeline(Struct):
     is_worded: bool = False
     tells: str = ""
     joins: list[Join] = field(default_factory=list)
+    unseen: frozenset[str] = frozenset()
+    """People who are found, but stand in no world."""
 
     def told(self) -> HeardLog:
         """All that recognition tells of it."""
         log = HeardLog(LIMIT)
         log.ids = {each.who: each.id for each in self.joins if each.changes is None}
         log.owners = {each.id: each.who for each in self.joins}
+        seen = [log.id(each) for each in self.people if each not in self.unseen]
         known = [each.who for each in self.joins if each.is_known]
-        log.take(_room(*map(log.id, self.people), *known, *((STRANGER,) if self.is_worded else ())), -60.0)
+        log.take(_room(*seen, *known, *((STRANGER,) if self.is_worded else ())), -60.0)
+        for one in self.unseen:
+            log.found(one, -60.0)
         if self.is_worded:
-            self._has_spoken(log, known)
+            self._has_spoken(log, [*seen, *known])
         for (at, _), _, step in sorted(self._steps(log), key=lambda each: each[:2]):
             log.until(at - 1e-6)
             step()
         log.until(10_000.0)
         return log
 
-    def _has_spoken(self, log: HeardLog, known: list[str]) -> None:
+    def _has_spoken(self, log: HeardLog, people: list[str]) -> None:
         """Have somebody say something to the robot, and go: so it is known that words are told, and addressees."""
         to = frozenset((ROBOT,)) if self.tells else None
         steps: list[tuple[float, Callable[[float], None]]] = [
@@ -124,7 +131,7 @@ class Timeline(Struct):
             (SAID_BEFORE[0], lambda at: log.begins(STRANGER, "speak", at)),
             (SAID_BEFORE[1], lambda at: log.ends(STRANGER, "speak", at)),
             (-57.9, lambda at: log.hears(STRANGER, *SAID_BEFORE, "so", at, to=to)),
-            (-40.0, lambda at: log.take(_room(*map(log.id, self.people), *known), at)),
+            (-40.0, lambda at: log.take(_room(*people), at)),
             (-40.0, lambda at: log.take(ActorLost(actor=STRANGER, at=stamp(at), left=True), at)),
         ]  # fmt: skip
         for at, step in steps:
@@ -164,6 +171,8 @@ def _of_span(log: HeardLog, one: Span, timeline: Timeline) -> Iterator[tuple[Ins
     since, until = one.since[0], one.until[0]
     yield one.since, 1, lambda: log.begins(one.who, one.action, since, target)
     yield one.until, 0, lambda: log.ends(one.who, one.action, until, target)
+    for at, text in one.heard:
+        yield at, 3, lambda at=at, text=text: log.hears(one.who, since, at[0], text, at[0], final=False)
     if one.action == "speak" and (one.known is not None or one.told):
         known = one.known or one.until
         to = frozenset((one.told,)) if one.told else None
