@@ -29,12 +29,15 @@ def addressed(timeline: Timeline) -> Timeline:
 
 def addressee(speech: Span, before: Timeline) -> str:
     """For whom a speech is; "": nobody knows. before: with looks, turns of the robot, all that was said before."""
+    if before.is_first and speech.known is not None and speech.until < speech.known and not _spoken(before):
+        found = _looked_at(speech, before) or _answered(speech, before)  # nobody knows that words will come
+        return found if found == ROBOT else called_by(speech.words, (ROBOT, *before.people), before.unseen) or found
     is_decided = speech.known is not None and _held_at(speech, before) <= speech.known[0]
     if speech.told and (before.tells == "early" or not is_decided):
         return speech.told
     if not is_decided and (called := called_by(speech.words, _known_by_name(speech, before), before.unseen)):
         return called
-    if not _company(speech, before):
+    if speech.is_line or not _company(speech, before):
         return ROBOT
     return _looked_at(speech, before) or _answered(speech, before)
 
@@ -64,6 +67,10 @@ def called_by(words: str, people: tuple[str, ...], unseen: Collection[str] = ())
             if plain[-len(parts) :] == parts and (len(rest) < SHORT or rest[-1].endswith(",")):
                 return who
     return ""
+
+
+def _spoken(before: Timeline) -> list[Span]:
+    return [each for each in before.spans if each.action == "speak"]
 
 
 def _held_at(speech: Span, before: Timeline) -> float:

@@ -25,7 +25,7 @@ LONGEST_SOUND_TOLD = 15.0
 THIRD_TURN = 1.5
 FACE_GRACE = 2.0
 ROUND = 1e-6
-BEFORE = (-1.0, 0)
+BEFORE = (-100.0, 0)
 LAST = 10**9
 """After all else that happens at a time."""
 
@@ -56,7 +56,7 @@ class Side:
         """The robot's last turn, if nobody has answered it in time."""
         self.cut_into: Span | None = None
         """The person's words into which the robot has begun its answer."""
-        self.third_until = -1.0
+        self.third_until = BEFORE[0]
         self.answers_until = BEFORE
         """End of the person's last answer: what begins before it is part of it."""
 
@@ -183,7 +183,7 @@ class Coder:
             self._turns |= {id(each) for each in kept}
         elif answer is not None:
             self._pair_of(turn, side, "succeeded", delay=answer.since[0] - turn.until[0])
-            side.answers_until, side.third_until = answer.until, -1.0
+            side.answers_until, side.third_until = answer.until, BEFORE[0]
             return answer
         elif turn.is_aborted:
             self._pair_of(turn, side, "withdrawn")
@@ -257,7 +257,7 @@ class Coder:
                 shown = sorted(each.since for each in sign if self._shows(each))
                 shown = shown if is_noise else [speech.since]
                 is_brief = speech.seconds <= (self._longest_sound if self._timeline.is_worded else BRIEF) + ROUND
-                takes_floor = speech.words not in LISTENING if is_known else not is_brief
+                takes_floor = speech.is_line or (speech.words not in LISTENING if is_known else not is_brief)
                 if speech.until > until or takes_floor:
                     self._turns.add(id(speech))
                 elif shown:
@@ -345,6 +345,8 @@ class Coder:
 
         is_noise: nothing is told of the sign unless words come, so that these may come after the turn.
         """
+        if speech.is_line:
+            return True
         is_open = turn.kind == "asks" or speech.seconds <= WORDS_WAIT + ROUND
         is_noise &= speech.seconds <= WORDS_WAIT + ROUND
         if is_open and (self._is_known_in(speech, turn) or (is_noise and self._is_last(speech))):
@@ -388,7 +390,7 @@ class Coder:
             for other in self._sides.values():
                 if other is not side and other.asked is turn and not self._begins_too(other, sign):
                     self._is_answered(other, turn, "succeeded", sign)
-            side.asked, side.answers_until, side.third_until = None, sign.until, -1.0
+            side.asked, side.answers_until, side.third_until = None, sign.until, BEFORE[0]
         elif sign.action == "speak" and (asked := self._asked_of_another(side, sign)) is not None:
             for other in self._sides.values():
                 if other.asked is asked:
@@ -400,7 +402,7 @@ class Coder:
             side.answers_until = sign.until
         elif sign.action == "speak":
             if not side.own and at <= side.third_until + ROUND:
-                side.third_until = -1.0
+                side.third_until = BEFORE[0]
             else:
                 side.own.append(sign)
 

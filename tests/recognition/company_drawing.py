@@ -35,6 +35,9 @@ class CompanyDrawing(Drawing):
         """People of whom no look is ever told."""
         self._silent = {each for each in NAMES[2:] if habits.random() < 0.15}
         super().__init__(seed)
+        self._leave_words_alone()
+        if self.timeline.is_worded and not self.timeline.tells and habits.random() < 0.4:
+            self._draw_first_words()
         self.timeline.unseen = frozenset(each for each in self.timeline.people if habits.random() < 0.15)
 
     def _speak(self, person: str, to: str, at: float, lasts: float) -> None:
@@ -49,6 +52,8 @@ class CompanyDrawing(Drawing):
             one.words = self._words(one, is_unsure=is_unsure)
             late = chance.choice((0.0, 0.1, self._between(0.0, 1.3 - one.seconds))) if one.seconds < 1.3 else 0.0
             one.known = max(self._at(until[0] + late), (until[0], until[1] + 1))
+        if tells == "late" and not one.words:
+            one.told = ""
         self.timeline.spans.append(one)
         if self.timeline.is_worded:
             self._hear_partly(one)
@@ -59,6 +64,36 @@ class CompanyDrawing(Drawing):
         if self._habits.random() < 0.3:
             turns = self._at(turns)[0]
         self.timeline.spans.append(Span(person, "look", (round(turns, 6), 0), (round(until[0] + 0.05, 6), 0), target))
+
+    def _draw_first_words(self) -> None:
+        """Draw the first words of all, long before the rest: nobody knows yet that there will be any."""
+        habits, who = self._habits, self._habits.choice(self.timeline.people)
+        one = Span(who, "speak", (-8.0, 0), (-8.0 + habits.choice((0.4, 1.0)), 1), ROBOT)
+        one.known = round(one.until[0] + habits.choice((0.0, 0.3, 1.5, 2.5)), 6), 2
+        one.words = self._words(one, is_unsure=True)
+        others = [each for each in self.timeline.people if each != who]
+        if face := habits.choice((ROBOT, "", habits.choice(others))):
+            self.timeline.spans.append(Span(who, "look", (-9.0, 0), (-6.5, 0), face))
+        self.timeline.spans.append(one)
+        self.timeline.is_first = True
+
+    def _leave_words_alone(self) -> None:
+        """Let nothing but the words tell of a speech, and type some of them: where nothing else is at that time."""
+        turns = [(since[0], until[0]) for turn in self.timeline.turns for since, until in turn.speech]
+        for one in self.timeline.spans:
+            if one.action != "speak" or one.known is None or one.seconds > 1.3 or one.known[0] > one.until[0] + 0.1:
+                continue
+            rest = [
+                each for each in self.timeline.spans
+                if each is not one and each.since[0] < one.known[0] + 0.7 and one.since[0] - 0.7 < each.until[0]
+            ]  # fmt: skip
+            if any(each.who == one.who and each.action != "look" for each in rest):
+                continue
+            if self._habits.random() < 0.15:
+                one.is_alone, one.heard, one.until, one.known = True, (), one.since, (one.since[0], one.since[1] + 1)
+            elif all(each.who == one.who for each in rest) and self._habits.random() < 0.5:
+                is_crossed = any(one.since[0] - 0.4 < at < one.known[0] + 0.4 for speech in turns for at in speech)
+                one.is_alone, one.heard = not is_crossed, () if not is_crossed else one.heard
 
     def _hear_partly(self, one: Span) -> None:
         """Let partial words come while somebody speaks: any, also names of others than who is called in the end."""

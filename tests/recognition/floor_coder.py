@@ -100,7 +100,11 @@ def has_spoken_since(one: Span, timeline: Timeline) -> bool:
 def _speaking(timeline: Timeline, floors: list[Floor]) -> Iterator[str]:
     """Who is told to speak at some instant, and does not, or the other way."""
     spoken = [(ROBOT, since[0], until[0]) for turn in timeline.turns for since, until in turn.speech]
-    spoken += [(each.who, each.since[0], each.until[0]) for each in timeline.spans if each.action == "speak"]
+    spoken += [
+        (each.who, each.since[0], each.until[0])
+        for each in timeline.spans
+        if each.action == "speak" and not each.is_alone
+    ]
     changes = sorted({at for _, since, until in spoken for at in (since, until)})
     for before, at in zip(changes, [*changes[1:], inf], strict=True):
         if at - before < SETTLED:

@@ -58,11 +58,15 @@ def judged(timeline: Timeline, told: list[Interjection]) -> Iterator[str]:
         life = lives.get(key, [])
         coded = _reading(one, timeline)
         last = life[-1].reading if life else ""
-        if one.is_beside and coded == {"noise"}:
-            coded = {"noise", ""}  # it may never be known to whom it is
+        if one.is_beside and (coded == {"noise"} or timeline.tells == "late"):
+            coded = {*coded, ""}  # to whom it is may never be known, or when the robot is silent
         if last not in coded:
             yield f"{key[0]} at {key[1]}{' beside' * one.is_beside}: told {last!r}, coded {sorted(coded)}"
-        elif not one.is_beside and (life[0].reading, life[0].at.seconds > key[1] + SETTLED) != ("open", False):
+        elif (
+            not one.is_beside
+            and not one.speech.is_alone
+            and (life[0].reading, life[0].at.seconds > key[1] + SETTLED) != ("open", False)
+        ):
             yield f"{key[0]} at {key[1]}: not open at once, {life[0]}"
     for key in lives.keys() & speeches - into.keys():
         if lives[key][-1].reading not in ("other", "noise"):
@@ -87,6 +91,8 @@ def _reading(one: Into, timeline: Timeline) -> set[str]:
     since, until, over = speech.since[0], speech.until[0], one.until[0]
     by_words = "backchannel" if speech.words in LISTENING else "interruption"
     outlasts = speech.until > one.until
+    if speech.is_line:
+        return {"interruption"}
     # In company it may wait until it is known to whom it is, and then has its words.
     is_waiting = len(timeline.people) > 1 and speech.words not in LISTENING
     taken = {"answer", "interruption"} if turn.is_aborted or one.is_beside or is_waiting else {"answer"}

@@ -45,6 +45,12 @@ class Span(Struct):
     told: str = ""
     heard: tuple[tuple[Instant, str], ...] = ()
     """Partial words, which change nothing."""
+    is_alone: bool = False
+    """True if nothing but the words tells of it; those of a typed line take no time."""
+
+    @property
+    def is_line(self) -> bool:
+        return self.is_alone and self.since[0] == self.until[0]
 
     @property
     def seconds(self) -> float:
@@ -102,6 +108,8 @@ class Timeline(Struct):
     is_worded: bool = False
     tells: str = ""
     joins: list[Join] = field(default_factory=list)
+    is_first: bool = False
+    """True if nobody has told words before the first of these."""
     unseen: frozenset[str] = frozenset()
     """People who are found, but stand in no world."""
 
@@ -109,13 +117,14 @@ class Timeline(Struct):
         """All that recognition tells of it."""
         log = HeardLog(LIMIT)
         log.ids = {each.who: each.id for each in self.joins if each.changes is None}
+        is_before = self.is_worded and not self.is_first
         log.owners = {each.id: each.who for each in self.joins}
         seen = [log.id(each) for each in self.people if each not in self.unseen]
         known = [each.who for each in self.joins if each.is_known]
-        log.take(_room(*seen, *known, *((STRANGER,) if self.is_worded else ())), -60.0)
+        log.take(_room(*seen, *known, *((STRANGER,) if is_before else ())), -60.0)
         for one in self.unseen:
             log.found(one, -60.0)
-        if self.is_worded:
+        if is_before:
             self._has_spoken(log, [*seen, *known])
         for (at, _), _, step in sorted(self._steps(log), key=lambda each: each[:2]):
             log.until(at - 1e-6)
@@ -169,8 +178,9 @@ def _room(*people: str) -> World:
 def _of_span(log: HeardLog, one: Span, timeline: Timeline) -> Iterator[tuple[Instant, int, Callable[[], object]]]:
     target = one.to if one.action == "look" else PIECES[0] if one.action == "point" else ""
     since, until = one.since[0], one.until[0]
-    yield one.since, 1, lambda: log.begins(one.who, one.action, since, target)
-    yield one.until, 0, lambda: log.ends(one.who, one.action, until, target)
+    if not one.is_alone:
+        yield one.since, 1, lambda: log.begins(one.who, one.action, since, target)
+        yield one.until, 0, lambda: log.ends(one.who, one.action, until, target)
     for at, text in one.heard:
         yield at, 3, lambda at=at, text=text: log.hears(one.who, since, at[0], text, at[0], final=False)
     if one.action == "speak" and (one.known is not None or one.told):
