@@ -29,6 +29,7 @@ from math import inf
 from msgspec import Struct, field
 
 from engage_hri.schemas.units import Seconds
+from engage_hri.services.recognition.events.limits import ROUNDING
 from engage_hri.services.recognition.events.listener_sign import SignPart
 
 LONGEST_UNKNOWN: Seconds = 3.0
@@ -66,6 +67,8 @@ class Spoken(Struct, kw_only=True):
     until: Seconds | None = None
     is_noise: bool = False
     """True if no words have come of it."""
+    may_be_noise: bool = False
+    """True as long as words of it would tell that it is no cough."""
     is_open: bool = False
     """True as long as it is not decided what it is that somebody says into the robot's words."""
     is_noted: bool = False
@@ -104,10 +107,11 @@ class FaceTimes(Struct):
         half = (self.at - since) / 2
         return next((face for face, lasted in self.looked.items() if lasted > half), "")
 
-    @property
-    def seen(self) -> set[str]:
-        """The faces that were looked at."""
-        return {face for face in (*self.looked, self.face) if face}
+    def most_from(self, face: str, since: Seconds) -> Seconds:
+        """Time from which on this face is the one, if the look stays; infinite: it is not looked at now."""
+        if self.face != face:
+            return inf
+        return 2 * (self.at - self.looked.get(face, 0.0)) - since + ROUNDING
 
 
 class OwnSpeech(Spoken, kw_only=True):
@@ -127,8 +131,6 @@ class OwnSpeech(Spoken, kw_only=True):
     """True once it has been told to the conversation."""
     is_beside: bool = False
     """True if it began while the robot said something to others."""
-    may_be_noise: bool = False
-    """True as long as words of it would tell that it is no cough."""
 
 
 def named(words: str, names: Mapping[str, str]) -> Addressees:

@@ -69,6 +69,10 @@ class Listener:
         if part.action == "speak":
             self._scene.read(self._id, part.since, "open")
 
+    def listens_to(self, part: SignPart) -> bool:
+        """True if this is part of the sign."""
+        return self.sign is not None and any(each is part for each in self.sign.parts)
+
     @property
     def is_beside(self) -> bool:
         """True while a sign is open that has begun beside the robot's words to others."""
@@ -152,7 +156,7 @@ class Listener:
 
         in_turn: the robot's turn goes on in which it was said. is_last: neither has begun to say anything since.
         """
-        if self.sign is not None and any(part is speech for part in self.sign.parts):
+        if self.listens_to(speech):
             if self._is_echo(speech):
                 self._tell(speech, at)  # the robot need not wait until it is over
             self.judge(at)
@@ -161,6 +165,8 @@ class Listener:
         is_new = speech.taken_for == "noise" and (in_turn or is_last)
         if listens is False and (is_new or (in_turn and speech.taken_for == "backchannel")):
             self._is_turn(speech, "interruption" if in_turn else "answer", at)
+        elif listens and speech.taken_for == "backchannel" and in_turn:
+            self._tell(speech, at)  # it is that of the nod beside it, which has been told
         elif listens and (is_new or self._exchange.pair.was_listening(speech.since)):
             if speech.until is None:
                 self._joins(speech)

@@ -130,6 +130,8 @@ class EventWriter:
 
     def __init__(self, clock: str, session: str = "", *, words_patience: Seconds = 0.0) -> None:
         self.effects: list[Effect] = []
+        self.now: Seconds = 0.0
+        """Time of what is being taken. What is told may have happened before."""
         self._clock = clock
         self._session = session
         self._count: dict[EventKind, int] = dict.fromkeys(EVENT_KINDS, 0)
@@ -204,20 +206,23 @@ class EventWriter:
         before = self._interjected.get(SpeechStart(person, speech))
         if before is not None and (reading == "open" or (before.reading, before.words) == (reading, words)):
             return
-        told = Interjection(actor=person, since=stamp(speech), at=stamp(at), reading=reading, words=words)
+        told = Interjection(
+            actor=person, since=stamp(speech), at=stamp(max(at, self.now)), reading=reading, words=words
+        )
         self._interjected[SpeechStart(person, speech)] = told
         self.effects.append(told)
 
     def decide_interjection(self, person: str, speech: Seconds, reading: InterjectionReading, at: Seconds) -> None:
-        """Tell what it is that somebody says into the robot's turn, if that it began has been told."""
-        if SpeechStart(person, speech) in self._interjected:
+        """Tell what it is that somebody says into the robot's turn, if that it began has been told, and no more."""
+        told = self._interjected.get(SpeechStart(person, speech))
+        if told is not None and told.reading in ("open", "noise"):
             self.interject(person, speech, reading, at)
 
     def interject_again(self, person: str, speech: Seconds, at: Seconds) -> None:
         """Tell once more what somebody has said into the robot's turn if its words are others by now."""
         told, words = self._interjected.get(SpeechStart(person, speech)), self.text_of(person, speech)
         if told is not None and words != told.words:
-            self.interject(person, speech, told.reading, max(at, told.at.seconds))
+            self.interject(person, speech, told.reading, at)
 
     def understand(self, person: str, speech: Seconds, text: str, at: Seconds) -> None:
         """Take the words of a speech, known at `at`. Events that consist of it are told again if they have others."""

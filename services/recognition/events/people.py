@@ -204,6 +204,9 @@ class People:
         while answered := self._writer.answered:
             # The end of a turn decides several answers in one instant: the first is that of who was silent.
             first = min(range(len(answered)), key=lambda n: answered[n][0].delay or 0.0)
+            event, at_end = answered[first]
+            if any(since < at_end + min(0.0, event.delay or 0.0) for since in scene.unknown.values()):
+                return  # somebody who began before may have answered, too
             told = partial(_answered_for_all, *answered.pop(first))
             for person in list(self.persons.values()):  # who has left meanwhile was asked, too
                 self._apply(person, at, told)

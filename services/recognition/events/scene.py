@@ -272,11 +272,14 @@ class SessionScene:
         """Take what a speech into the robot's words is."""
         if (spoken := self.spoken_since(actor, since)) is not None:
             spoken.is_open, spoken.is_noise = reading == "open", reading == "noise"
+            spoken.may_be_noise &= spoken.is_open
             self.floor_changes += 1
 
     def ended(self) -> list[Spoken]:
         """The speeches that were over last, in the order of their ends: of those known to be some, and to whom."""
-        known = [each for each in self.spoken if each.named and not (each.is_open or each.is_noise)]
+        known = [
+            each for each in self.spoken if each.named and not (each.is_open or each.may_be_noise or each.is_noise)
+        ]
         over = [(each.until, each.since, each) for each in known if each.until is not None]
         return [each for _, _, each in sorted(over, key=lambda one: one[:2])[-ENDED_TOLD:]]
 

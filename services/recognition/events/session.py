@@ -141,6 +141,7 @@ class Session:
 
     def _take_step(self) -> None:
         """Take the step that is due first: a person's, or the end of the robot's look."""
+        self._writer.now = max(self._writer.now, self._agenda.look)
         if self._agenda.first != self.robot:
             self._people.advance()
         else:
@@ -154,6 +155,7 @@ class Session:
         while self._agenda.look < at - ROUNDING:
             self._take_step()
         self._people.forget(at)
+        self._writer.now = at
         self._takes[type(observation)](observation, at)
         return self._take()
 
@@ -360,7 +362,6 @@ class Session:
             self._people.apply(
                 words.actor, at, lambda person: person.talk.understand(words.since, words.text, words.to, at)
             )
-        self._writer.interject_again(words.actor, words.since, at)
 
     def _robot_is_heard(self, state: RobotState, at: Seconds) -> None:
         """End speech with a lost end: the body showed that it speaks, and for `SILENCE` no longer does."""

@@ -103,10 +103,11 @@ class Talk(KindRecognizer):
         is_known = says_words(speech.words) or (self.id, since) in scene.echoes
         is_sign = self._conversation.is_into_turn(since)  # it holds the robot, which waits for no more than it has to
         if until is None:
-            seen = speech.faces.seen
-            if is_sign and is_known and seen <= {scene.robot} and not is_listening(speech.words):
-                return since
-            return since + (listener.longest if is_sign and seen == {scene.robot} else scene.longest_unknown)
+            at_last = since + scene.longest_unknown
+            if not is_sign:
+                return at_last
+            early = since if is_known and not is_listening(speech.words) else since + listener.longest
+            return min(at_last, max(early, speech.faces.most_from(scene.robot, since)))
         if is_known or not (scene.is_worded or scene.tells_addressees):
             return until
         is_seen = is_sign and speech.faces.most(since) == scene.robot and not scene.tells_addressees
@@ -205,13 +206,25 @@ class Talk(KindRecognizer):
         """Take the words of a speech. told: addressees, if perception knows them."""
         speech = self._speeches.get(since)
         if speech is None:
+            self._writer.interject_again(self.id, since, at)
             return
         speech.words, speech.told = words or speech.words, told or speech.told
-        speech.may_be_noise &= not says_words(speech.words)
-        if not speech.is_heard or speech.part.taken_for == "noise":
+        self._is_known_speech(speech, is_known=says_words(speech.words))
+        if not speech.is_heard or speech.is_noise:
             self._has_news(speech, at)
-        self.take(at, lambda talk: talk.understand(speech.part, at))
+        self.take(at, lambda talk: self._judge(talk, speech, at))
         self.go_on(at)
+
+    def _judge(self, talk: Conversation, speech: OwnSpeech, at: Seconds) -> None:
+        """Take the words of a speech in their turn; if they decide nothing they are told all the same."""
+        talk.understand(speech.part, at)
+        self._writer.interject_again(self.id, speech.since, at)
+
+    def _is_known_speech(self, speech: OwnSpeech, *, is_known: bool = True) -> None:
+        """Note that a sound is no noise, or that nothing else may be known of it."""
+        if is_known and speech.may_be_noise:
+            speech.may_be_noise = False
+            self._scene.floor_changes += 1
 
     def _has_news(self, speech: OwnSpeech, at: Seconds) -> None:
         """Take news of a speech of which nothing is told yet: it may be for others than it seemed, and no noise."""
@@ -227,6 +240,8 @@ class Talk(KindRecognizer):
             speech.part.until = speech.until
             if speech.until is None:
                 self.take_early(speech.since, lambda talk: talk.speaks(speech.part, beside=speech.is_beside))
+            elif speech.is_into_turn or speech.is_beside:
+                speech.part.taken_for = "noise"  # as such it is judged by its words
             else:
                 self.take_early(speech.since, lambda talk: talk.has_said(speech.part))
 
@@ -268,18 +283,17 @@ class Talk(KindRecognizer):
 
     def _is_open(self, speech: OwnSpeech) -> bool:
         """True if a speech is not decided."""
-        sign = self._conversation.listener.sign
         is_in_line = any(each is speech for _, each in self._line)
-        return is_in_line or (sign is not None and any(part is speech.part for part in sign.parts))
+        return is_in_line or self._conversation.listener.listens_to(speech.part)
 
     def _begin_again(self, speech: OwnSpeech) -> None:
         """Put a speech in line, in its place."""
         since, until, speech.is_heard = speech.since, speech.until, False
         speech.part = SignPart("speak", since, speech.part.confidence)
-        self._line.insert(sum(at <= since for at, _ in self._line), (since, speech))
+        self._line.insert(self._place(since), (since, speech))
         if until is not None:
             step = lambda talk: talk.falls_silent(until) if speech.is_to(self._scene.robot) else None  # noqa: E731
-            self._line.insert(sum(at <= until for at, _ in self._line), (until, step))
+            self._line.insert(self._place(until), (until, step))
 
     def person_back(self) -> None:
         """Take the person's return: the robot may be speaking, or may have fallen silent meanwhile."""
@@ -303,12 +317,15 @@ class Talk(KindRecognizer):
 
     def take_early(self, at: Seconds, step: Step) -> None:
         """Take what happened at `at` and is known only now: it comes before all in line that happened later."""
-        place = sum(when <= at for when, _ in self._line)
-        if place:
+        if place := self._place(at):
             self._line.insert(place, (at, step))
         else:
             self._catch_up(at)
             step(self._conversation)
+
+    def _place(self, at: Seconds) -> int:
+        """Number of those in line that come before what happened at `at`."""
+        return next((n for n, (when, _) in enumerate(self._line) if when > at), len(self._line))
 
     def limit(self, wanted: Event) -> Seconds | None:
         if not EVENT_KINDS[wanted.kind].is_answered:
@@ -390,7 +407,8 @@ class Talk(KindRecognizer):
         """True if the first speech in line may be a cough. The conversation judges those into the robot's words."""
         is_aside = speech.faces.most(speech.since) not in ("", self._scene.robot)
         is_into_words = speech.is_beside or self._conversation.is_into_turn(speech.since)
-        return speech.may_be_noise and (is_aside or not is_into_words)
+        is_for_others = speech.to is not None and not speech.is_to(self._scene.robot)
+        return speech.may_be_noise and (is_aside or is_for_others or not is_into_words)
 
     def _is_known(self, speech: OwnSpeech) -> bool:
         """True if it is known to whom the first speech in line is, and that it is one."""
@@ -423,6 +441,7 @@ class Talk(KindRecognizer):
         if speech.is_to(self._scene.robot):
             speech.is_heard = True
             self._conversation.speaks(speech.part, beside=speech.is_beside)
+            self._is_known_speech(speech, is_known=not self._conversation.listener.listens_to(speech.part))
 
     def _decide(self, speech: OwnSpeech, at: Seconds) -> None:
         """Decide what the sound is, by what is known: nothing, if it is over and has no words; else to whom it is."""
@@ -430,7 +449,7 @@ class Talk(KindRecognizer):
         # The conversation judges what is for the robot, and said into its words.
         is_judged_here = self._may_be_noise(speech) or self._scene.robot not in to
         is_noise = is_judged_here and speech.may_be_noise and speech.until is not None
-        speech.may_be_noise = False
+        self._is_known_speech(speech)
         if is_noise:
             speech.is_noise, speech.to = True, NOBODY
             self._writer.decide_interjection(self.id, speech.since, "noise", at)
