@@ -20,6 +20,8 @@ MENTIONS = (
     "赤いのを取って。でも、これもいい。それは{0}",
 )  # fmt: skip
 """Words about somebody."""
+FIRST_LAST = 10.0
+"""Seconds that belong to the first words of all."""
 LONGEST_UNSURE = 2.5
 """Longest speech, in seconds, of which words and looks contradict each other: nobody decides before it is over."""
 
@@ -67,13 +69,14 @@ class CompanyDrawing(Drawing):
 
     def _draw_first_words(self) -> None:
         """Draw the first words of all, long before the rest: nobody knows yet that there will be any."""
+        self.timeline.delay(FIRST_LAST)
         habits, who = self._habits, self._habits.choice(self.timeline.people)
-        one = Span(who, "speak", (-8.0, 0), (-8.0 + habits.choice((0.4, 1.0)), 1), ROBOT)
+        one = Span(who, "speak", (2.0, 0), (2.0 + habits.choice((0.4, 1.0)), 1), ROBOT)
         one.known = round(one.until[0] + habits.choice((0.0, 0.3, 1.5, 2.5)), 6), 2
         one.words = self._words(one, is_unsure=True)
         others = [each for each in self.timeline.people if each != who]
         if face := habits.choice((ROBOT, "", habits.choice(others))):
-            self.timeline.spans.append(Span(who, "look", (-9.0, 0), (-6.5, 0), face))
+            self.timeline.spans.append(Span(who, "look", (1.0, 0), (3.5, 0), face))
         self.timeline.spans.append(one)
         self.timeline.is_first = True
 

@@ -65,12 +65,22 @@ def judged(timeline: Timeline, told: list[Interjection]) -> Iterator[str]:
         elif (
             not one.is_beside
             and not one.speech.is_alone
+            and not _looks_at_neighbor(one.speech, timeline)
             and (life[0].reading, life[0].at.seconds > key[1] + SETTLED) != ("open", False)
         ):
             yield f"{key[0]} at {key[1]}: not open at once, {life[0]}"
     for key in lives.keys() & speeches - into.keys():
         if lives[key][-1].reading not in ("other", "noise"):
             yield f"{key[0]} at {key[1]}: not to the robot: {[each.reading for each in lives[key]]}"
+
+
+def _looks_at_neighbor(speech: Span, timeline: Timeline) -> bool:
+    """True if somebody looks at another face than the robot's when they begin to speak."""
+    return any(
+        each.who == speech.who and each.action == "look" and each.to != ROBOT
+        and each.since[0] <= speech.since[0] < each.until[0] + SETTLED
+        for each in timeline.spans
+    )  # fmt: skip
 
 
 def _into(timeline: Timeline) -> Iterator[Into]:

@@ -113,6 +113,21 @@ class Timeline(Struct):
     unseen: frozenset[str] = frozenset()
     """People who are found, but stand in no world."""
 
+    def delay(self, seconds: float) -> None:
+        """Let all happen later."""
+
+        def later(at: Instant) -> Instant:
+            return round(at[0] + seconds, 6), at[1]
+
+        for one in self.spans:
+            one.since, one.until, one.known = later(one.since), later(one.until), one.known and later(one.known)
+            one.heard = tuple((later(at), text) for at, text in one.heard)
+        for turn in self.turns:
+            turn.speech = [(later(since), later(until)) for since, until in turn.speech]
+            turn.until = later(turn.until)
+        for each in self.away:
+            each.since, each.until = later(each.since), later(each.until)
+
     def told(self) -> HeardLog:
         """All that recognition tells of it."""
         log = HeardLog(LIMIT)
