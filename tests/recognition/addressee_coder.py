@@ -55,17 +55,15 @@ def called_by(words: str, people: tuple[str, ...], unseen: Collection[str] = ())
     unseen: people of whom only the ids are known.
     """
     said = [each for each in words.replace("、", ", ").replace("。", ". ").split() if any(map(str.isalnum, each))]
-    for who in people:
-        for name in (who, *filter(None, () if who in unseen else (CALLED.get(who),))):
-            parts = name.casefold().split()
-            plain = [each.strip(",.!?").casefold() for each in said]
-            if not plain or len(parts) > len(plain):
-                continue
-            if plain[: len(parts)] == parts:
-                return who
-            rest = said[: -len(parts)]
-            if plain[-len(parts) :] == parts and (len(rest) < SHORT or rest[-1].endswith(",")):
-                return who
+    plain = [each.strip(",.!?").casefold() for each in said]
+    names = [(name.casefold().split(), who) for who in people for name in (who, CALLED.get(who, ""))
+             if name == who or (name and who not in unseen)]  # fmt: skip
+    for parts, who in sorted(names, key=lambda each: -len(each[0])):
+        if plain[: len(parts)] == parts:
+            return who
+        rest = said[: -len(parts)]
+        if plain[-len(parts) :] == parts and (len(rest) < SHORT or rest[-1].endswith(",")):
+            return who
     return ""
 
 

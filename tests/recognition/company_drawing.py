@@ -65,6 +65,8 @@ class CompanyDrawing(Drawing):
         turns = since[0] + chance.choice((-0.05, self._between(0.0, min(LATE_HEAD, 0.45 * one.seconds))))
         if self._habits.random() < 0.3:
             turns = self._at(turns)[0]
+        looked = [each.until[0] for each in self.timeline.spans if each.who == person and each.action == "look"]
+        turns = max([turns, *(end + 0.01 for end in looked)])
         self.timeline.spans.append(Span(person, "look", (round(turns, 6), 0), (round(until[0] + 0.05, 6), 0), target))
 
     def _draw_first_words(self) -> None:

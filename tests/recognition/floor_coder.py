@@ -34,8 +34,10 @@ def judged(timeline: Timeline, floors: list[Floor]) -> Iterator[str]:
             yield f"floor at {floor.at.seconds}: not in the order of their ends: {told}"
     yield from _taken_back(floors)
     for at in _quiet(timeline):
-        before = sorted((each for each in coded.values() if each[2] < at), key=lambda each: (each[2], each[1]))
-        told = [_said(each) for each in _at(floors, at).ended]
+        before = sorted(
+            (each for each in coded.values() if each[2] < at), key=lambda each: (each[2], each[1], each[0])
+        )
+        told = sorted((_said(each) for each in _at(floors, at).ended), key=lambda each: (each[2], each[1], each[0]))
         expected = before[-LAST:]
         if told != expected:
             yield f"floor at {at}: told  {[each for each in told if each not in expected]}"
@@ -47,7 +49,8 @@ def _taken_back(floors: list[Floor]) -> Iterator[str]:
     """What was told to have been said, and is gone although not four others have ended later."""
     for one, other in pairwise(floors):
         told, then = [_said(each) for each in one.ended], [_said(each) for each in other.ended]
-        gone = [each for each in told if each not in then and sum(later[2] >= each[2] for later in then) < LAST]
+        still = {each[:2] for each in then}  # to whom may be corrected
+        gone = [each for each in told if each[:2] not in still and sum(later[2] >= each[2] for later in then) < LAST]
         if gone:
             yield f"floor at {other.at.seconds}: told before, and not any more: {gone}"
 
