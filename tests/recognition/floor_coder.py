@@ -73,7 +73,7 @@ def is_noise(one: Span, timeline: Timeline) -> bool:
         return False
     longest, wait = longest_sound(timeline), one.until[0] + WORDS_AFTER
     for turn in timeline.turns:
-        for since, until in [*turn.speech, *([(turn.since, turn.until)] if one.who in turn.to else [])]:
+        for since, until in [(turn.since, turn.until)] if one.who in turn.to else turn.speech:
             if one.to == ROBOT and since < one.since < until:
                 if until < one.until:
                     return False

@@ -22,6 +22,8 @@ KEYS: dict[type, str] = {
     BlockProgress: keys.FEEDBACK,
 }  # fmt: skip
 """Keys of what is no action."""
+REMEMBERED = 64
+"""Latest events that are told again when an id turns out to be another's."""
 Told = TypeVar("Told", bound=Message)
 
 
@@ -93,8 +95,11 @@ class HeardLog:
     def misnamed(self) -> Iterator[str]:
         """What is told by another id than the person's own, although it is known that they are one."""
         last: dict[str, ConnectionEvent] = {}
+        remembered: set[str] = set()
         for number, each in enumerate(self.told):
             joined = {id for id, since in self.joined.items() if since <= number}
+            if number in self.joined.values():
+                remembered |= {*list(last)[-REMEMBERED:]}
             match each:
                 case ConnectionEvent(initiator=initiator, responder=responder, answered_by=by):
                     named, last[each.id] = {initiator, responder, by}, each
@@ -107,7 +112,7 @@ class HeardLog:
             if named & joined:
                 yield f"told by the other id: {each}"
         for each in last.values():
-            if {each.initiator, each.responder, each.answered_by} & self.joined.keys():
+            if each.id in remembered and {each.initiator, each.responder, each.answered_by} & self.joined.keys():
                 yield f"not told again by the own id: {each}"
 
     def id(self, person: str) -> str:
