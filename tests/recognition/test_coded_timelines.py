@@ -13,8 +13,8 @@ from tests.recognition import gaze_coder, judged_talk, party_timeline
 Differences = Callable[[int], tuple[int, list[str]]]
 JUDGES: dict[str, tuple[Differences, int]] = {
     "talk": (judged_talk.differences, 1000),
-    "company": (judged_talk.in_company, 600),
-    "joins": (judged_talk.with_joins, 600),
+    "company": (judged_talk.in_company, 360),
+    "joins": (judged_talk.with_joins, 360),
     "looks": (gaze_coder.differences, 1000),
     "parties": (party_timeline.differences, 60),
 }
