@@ -125,7 +125,7 @@ def test_each_is_told_open_and_then_decided_in_time(seed: int) -> None:
         ("bob", None, []),
         ("bob", ROBOT, [("open", 2.3), ("interruption", 2.8)]),
         ("", "bob", [("open", 2.0), ("other", 5.0)]),
-        ("", None, [("open", 2.0), ("interruption", 2.8)]),
+        ("", None, [("open", 2.0), ("interruption", 5.0)]),
     ],
 )
 def test_who_looks_at_a_neighbor_does_not_hold_the_robot(

@@ -127,6 +127,8 @@ class OwnSpeech(Spoken, kw_only=True):
     words: str = ""
     is_into_turn: bool = False
     """True if it began while the robot had the floor, as far as is known."""
+    is_decided: bool = False
+    """True once nothing more of it is waited for."""
     is_heard: bool = False
     """True once it has been told to the conversation."""
     is_beside: bool = False

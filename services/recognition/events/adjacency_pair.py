@@ -98,6 +98,11 @@ class AdjacencyPair(Machine):
         return self.state == INTERRUPTED
 
     @property
+    def interrupted_since(self) -> Seconds:
+        """Start of the answer to the robot's first turn, which goes on; infinite: there is none."""
+        return self._response_since if self.state == INTERRUPTED and self._by_robot else inf
+
+    @property
     def deadline(self) -> Seconds:
         if self.event is None or self.state not in (ROBOT_WAITING, HUMAN_WAITING, INTERRUPTED):
             return inf
