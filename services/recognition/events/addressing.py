@@ -31,6 +31,7 @@ from msgspec import Struct, field
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.events.limits import ROUNDING
 from engage_hri.services.recognition.events.listener_sign import SignPart
+from engage_hri.services.text.calling import greeting_before, without_honorific
 
 LONGEST_UNKNOWN: Seconds = 3.0
 """Time after which a sound that still goes on is speech, and it is decided by the looks so far to whom. Ours."""
@@ -127,6 +128,8 @@ class OwnSpeech(Spoken, kw_only=True):
     words: str = ""
     is_into_turn: bool = False
     """True if it began while the robot had the floor, as far as is known."""
+    is_decided: bool = False
+    """True once nothing more of it is waited for."""
     is_heard: bool = False
     """True once it has been told to the conversation."""
     is_beside: bool = False
@@ -136,23 +139,31 @@ class OwnSpeech(Spoken, kw_only=True):
 def named(words: str, names: Mapping[str, str]) -> Addressees:
     """People and robots who are called by the words. names: actor ids by the names by which people call them.
 
-    A name calls somebody if it stands first, last after a comma, or last of a few words: "hello robot". In the
-    middle, and at the end of a sentence, it may be what the sentence is about.
+    A name calls somebody if it stands first, maybe after a greeting, last after a comma, or last of a few words: "hey
+    Ann, look", "hello robot". In the middle, and at the end of a sentence, it may be what the sentence is about.
     """
     said = [word for word in WORDS.findall(words) if any(map(str.isalnum, word))]
     if not said:
         return NOBODY
     lengths = range(1 + max((name.count(" ") for name in names), default=0), 0, -1)
-    calls = [said[:length] for length in lengths if _plain(said[:length]) in names][:1]
-    after = len(calls[0]) if calls else 1
+    after = greeting_before([_plain([word]) for word in said])
+    begun = [(begin, length) for begin in dict.fromkeys((0, after)) for length in lengths]
+    calls = [(begin, begin + length) for begin, length in begun if _called(said[begin : begin + length], names)][:1]
+    after = calls[0][1] if calls else max(1, after)
     calls += [
-        said[-length:]
+        (len(said) - length, len(said))
         for length in lengths
         if after + length <= len(said)
         and (len(said) - length < SHORT_CALL or said[-length - 1].endswith(COMMAS))
-        and _plain(said[-length:]) in names
+        and _called(said[-length:], names)
     ][:1]
-    return frozenset(names[_plain(call)] for call in calls)
+    return frozenset(_called(said[begin:end], names) for begin, end in calls)
+
+
+def _called(words: list[str], names: Mapping[str, str]) -> str:
+    """Actor id of the one of whom these words are the name, maybe with an honorific; "": they are none."""
+    name = _plain(words)
+    return names.get(name) or names.get(without_honorific(name), "")
 
 
 def _plain(words: list[str]) -> str:

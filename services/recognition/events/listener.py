@@ -17,6 +17,7 @@ says nothing any more: an old "stop" would answer what was asked after it. Of wh
 the robot speaks to others, nothing is in a turn of theirs.
 """
 
+from collections.abc import Sequence
 from math import inf
 
 from engage_hri.schemas.behaviors import Action
@@ -199,19 +200,24 @@ class Listener:
 
     def _takes_floor(self, part: SignPart, at: Seconds, reading: InterjectionReading) -> None:
         """Take a part of the sign as a turn of the person since it began. Speech before it was a listener's."""
+        beside: list[Seconds] = []
         for speech in self.sign.speeches if self.sign is not None else ():
             if speech.since < part.since:
                 self._tell(speech, at)
             elif speech is not part:  # it goes on beside the gesture that answers, and is of that answer
                 self._read(speech.since, reading, at)
+                beside.append(speech.since)
         self.sign = None
-        self._is_turn(part, reading, at)
+        self._is_turn(part, reading, at, beside)
 
-    def _is_turn(self, part: SignPart, reading: InterjectionReading, at: Seconds) -> None:
+    def _is_turn(
+        self, part: SignPart, reading: InterjectionReading, at: Seconds, beside: Sequence[Seconds] = ()
+    ) -> None:
+        """Take a part as a turn. beside: starts of what is said with it."""
         if part.action == "speak":
             self._read(part.since, reading, at)
         part.taken_for = "turn"
-        self._exchange.take(part)
+        self._exchange.take(part, beside)
 
     def _tell(self, speech: SignPart, at: Seconds) -> None:
         """Tell that a speech was a listener's, or noise where its words would have come."""

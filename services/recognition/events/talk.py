@@ -10,7 +10,9 @@ A sound into the robot's own words is decided by the conversation, which knows w
 
 from collections import deque
 from collections.abc import Callable
+from itertools import islice
 from math import inf, nextafter
+from typing import NamedTuple
 
 from engage_hri.schemas.behaviors import EVENT_KINDS, Action, Event
 from engage_hri.schemas.perception import ActionBegan
@@ -39,13 +41,19 @@ SPEECHES_KEPT = 8
 Step = Callable[[Conversation], object]
 
 
+class CutOff(NamedTuple):
+    """The robot's turn was cut off: its pair ends, unless somebody has answered it before."""
+
+    step: Step
+
+
 class Talk(KindRecognizer):
     """Talk of one person with the robot: adjacency pairs, and the backchannels of both."""
 
     def __init__(self, id: str, scene: SessionScene, config: RecognitionConfig, writer: EventWriter) -> None:
         super().__init__(id, scene, config, writer)
         self._conversation = Conversation(id, scene, config, writer)
-        self._line: deque[tuple[Seconds, Step | OwnSpeech]] = deque()
+        self._line: deque[tuple[Seconds, Step | OwnSpeech | CutOff]] = deque()
         """What is not told yet, with its times. The first is a speech of which it is not known to whom it is."""
         self._asked_in_line: Seconds = inf
         """Start of the first turn of the robot that is in line; infinite: none is."""
@@ -78,6 +86,13 @@ class Talk(KindRecognizer):
         return pair.event.started if pair.event is not None and pair.may_be_answered else self._asked_in_line
 
     @property
+    def has_answered_since(self) -> Seconds:
+        """Start of what answers the robot's turn, or may; infinite: nothing does."""
+        pair, sign = self._conversation.pair, self._conversation.listener.sign
+        since = [each.since for each in sign.speeches] if sign is not None else []
+        return min([*since, pair.interrupted_since, *(at for at, _ in islice(self._line, 1))])
+
+    @property
     def is_under_way(self) -> bool:
         """True if either speaks to the other, or something of the talk is open."""
         return bool(self._line) or self._conversation.is_under_way
@@ -107,10 +122,12 @@ class Talk(KindRecognizer):
             if not is_sign:
                 return at_last
             early = since if is_known and not is_listening(speech.words) else since + listener.longest
-            return min(at_last, max(early, speech.faces.most_from(scene.robot, since)))
+            is_for_robot = since if speech.is_to(scene.robot) else speech.faces.most_from(scene.robot, since)
+            return min(at_last, max(early, is_for_robot))
         if is_known or not (scene.is_worded or scene.tells_addressees):
             return until
-        is_seen = is_sign and speech.faces.most(since) == scene.robot and not scene.tells_addressees
+        is_seen = speech.faces.most(since) == scene.robot and not scene.tells_addressees
+        is_seen = is_sign and (is_seen or speech.is_to(scene.robot))
         over = until + (0.0 if is_seen else WORDS_AFTER)
         return max(over, since + WORDS_WAIT) if is_sign or speech.is_beside else over
 
@@ -160,9 +177,13 @@ class Talk(KindRecognizer):
         self._queue(at, speech)
 
     def _may_interrupt(self, speech: OwnSpeech, face: str, at: Seconds) -> None:
-        """Tell of a speech into the robot's turn, unless it is for somebody else, or looks like that."""
+        """Tell of a speech into the robot's turn, unless it is for somebody else, or looks like that.
+
+        Of one into its words to others that is told when it is known to be for the robot.
+        """
         is_aside = face not in ("", self._scene.robot) if speech.to is None else not speech.is_to(self._scene.robot)
-        if speech.is_into_turn and not is_aside:
+        is_for_robot = speech.is_beside and speech.is_to(self._scene.robot)
+        if (speech.is_into_turn or is_for_robot) and not is_aside:
             self._writer.interject(self.id, speech.since, "open", at)
 
     def _falls_silent(self, at: Seconds) -> None:
@@ -235,6 +256,7 @@ class Talk(KindRecognizer):
             self._address(speech, self._likely(speech, at), at)
         if not speech.is_to(robot):
             speech.is_noise = speech.is_heard = False  # more of the words may still call it
+            speech.part.taken_for = ""
         elif not speech.is_heard and not any(each is speech for _, each in self._line):
             speech.is_noise, speech.is_heard = False, True
             speech.part.until = speech.until
@@ -288,7 +310,7 @@ class Talk(KindRecognizer):
 
     def _begin_again(self, speech: OwnSpeech) -> None:
         """Put a speech in line, in its place."""
-        since, until, speech.is_heard = speech.since, speech.until, False
+        since, until, speech.is_heard, speech.is_decided = speech.since, speech.until, False, False
         speech.part = SignPart("speak", since, speech.part.confidence)
         self._line.insert(self._place(since), (since, speech))
         if until is not None:
@@ -370,7 +392,11 @@ class Talk(KindRecognizer):
 
     def abort(self, at: Seconds, *, turn: str) -> None:
         # Who has interrupted the turn has done so before that, also if it is known only now, and told of `at`.
-        self._take_in_order(nextafter(at, inf), lambda talk: talk.abort(at, turn=turn))
+        cut_off = CutOff(lambda talk: talk.abort(at, turn=turn))
+        if self._line or (self.asked_since < inf and self._scene.is_contested(self.id, at)):
+            self._line.append((nextafter(at, inf), cut_off))
+        else:
+            cut_off.step(self._conversation)
 
     def block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
         self.take(at, lambda talk: talk.block_ended(block, at, aborted=aborted))
@@ -383,19 +409,21 @@ class Talk(KindRecognizer):
             self.take(at, step)
 
     def _waits_for_others(self, at: Seconds) -> bool:
-        """True if somebody else may have answered the robot before `at`."""
-        return self._scene.is_contested(self.id, at)
+        """True if somebody else may have answered the robot before `at`. In its turn each who interrupts answers."""
+        return not self._conversation.is_into_turn(at) and self._scene.is_contested(self.id, at)
 
     @property
     def _is_behind_others(self) -> bool:
         """True if the first in line waits until it is known whether somebody else has answered before."""
         since = self.undecided_since
-        return since is not None and self._waits_for_others(since)
+        if since is None or isinstance(self._line[0][1], CutOff):
+            return since is not None and self._scene.is_contested(self.id, since)
+        return self._waits_for_others(since)
 
     @property
     def _undecided(self) -> list[OwnSpeech]:
         speeches = [each for _, each in self._line if isinstance(each, OwnSpeech)]
-        return [each for each in speeches if each.to is None or each.may_be_noise]
+        return [each for each in speeches if not each.is_decided and (each.to is None or each.may_be_noise)]
 
     @property
     def _undecided_first(self) -> OwnSpeech | None:
@@ -404,15 +432,18 @@ class Talk(KindRecognizer):
         return first if isinstance(first, OwnSpeech) and not self._is_known(first) else None
 
     def _may_be_noise(self, speech: OwnSpeech) -> bool:
-        """True if the first speech in line may be a cough. The conversation judges those into the robot's words."""
-        is_aside = speech.faces.most(speech.since) not in ("", self._scene.robot)
+        """True if the first speech in line may be a cough. Of who is alone with it the conversation judges."""
+        return speech.may_be_noise and bool(speech.company or not self._is_into_words(speech))
+
+    def _is_into_words(self, speech: OwnSpeech) -> bool:
+        """True of what is for the robot, as far as is known, and into its words: the conversation says what it is."""
+        may_be = speech.faces.most(speech.since) in ("", self._scene.robot)
         is_into_words = speech.is_beside or self._conversation.is_into_turn(speech.since)
-        is_for_others = speech.to is not None and not speech.is_to(self._scene.robot)
-        return speech.may_be_noise and (is_aside or is_for_others or not is_into_words)
+        return is_into_words and (may_be if speech.to is None else speech.is_to(self._scene.robot))
 
     def _is_known(self, speech: OwnSpeech) -> bool:
         """True if it is known to whom the first speech in line is, and that it is one."""
-        return speech.to is not None and not self._may_be_noise(speech)
+        return speech.is_decided or (speech.to is not None and not self._may_be_noise(speech))
 
     def _find(self, speech: OwnSpeech, at: Seconds) -> bool:
         """Decide to whom the speech is if that is certain."""
@@ -427,6 +458,8 @@ class Talk(KindRecognizer):
         speech.to = to
         if self._scene.robot not in to:
             self._writer.decide_interjection(self.id, speech.since, "other", at)
+        elif speech.until is None:
+            self._may_interrupt(speech, "", at)
         self._scene.note_spoken(speech)
 
     def _queue(self, at: Seconds, speech: OwnSpeech) -> None:
@@ -446,10 +479,10 @@ class Talk(KindRecognizer):
     def _decide(self, speech: OwnSpeech, at: Seconds) -> None:
         """Decide what the sound is, by what is known: nothing, if it is over and has no words; else to whom it is."""
         to = self._likely(speech, at) if speech.to is None else speech.to
-        # The conversation judges what is for the robot, and said into its words.
-        is_judged_here = self._may_be_noise(speech) or self._scene.robot not in to
+        is_judged_here = not self._is_into_words(speech) or self._scene.robot not in to
         is_noise = is_judged_here and speech.may_be_noise and speech.until is not None
-        self._is_known_speech(speech)
+        speech.is_decided = True
+        self._is_known_speech(speech, is_known=is_judged_here)
         if is_noise:
             speech.is_noise, speech.to = True, NOBODY
             self._writer.decide_interjection(self.id, speech.since, "noise", at)
@@ -488,10 +521,10 @@ class Talk(KindRecognizer):
             if self._is_behind_others:
                 break
             self._line.popleft()
-            if not isinstance(item, OwnSpeech):
-                item(self._conversation)
-            else:
+            if isinstance(item, OwnSpeech):
                 self._tell(item)
+            else:
+                (item.step if isinstance(item, CutOff) else item)(self._conversation)
         if not self._line:
             self._asked_in_line = inf
 
