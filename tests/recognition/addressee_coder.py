@@ -13,6 +13,8 @@ from tests.recognition.floor_coder import is_noise
 from tests.recognition.observations import ROBOT
 from tests.recognition.timeline import CALLED, LIMIT, Span, Timeline
 
+GREETINGS = ("hey", "hello")
+"""Words before a name that calls somebody, of those that are drawn."""
 SHORT = 3
 """Words up to which a name at the end calls somebody."""
 HALF = 0.5
@@ -56,6 +58,9 @@ def called_by(words: str, people: tuple[str, ...], unseen: Collection[str] = ())
     """
     said = [each for each in words.replace("、", ", ").replace("。", ". ").split() if any(map(str.isalnum, each))]
     plain = [each.strip(",.!?").casefold() for each in said]
+    if plain and plain[0] in GREETINGS:
+        plain, said = plain[1:], said[1:]
+    plain = [each.removesuffix("さん") for each in plain]
     names = [(name.casefold().split(), who) for who in people for name in (who, CALLED.get(who, ""))
              if name == who or (name and who not in unseen)]  # fmt: skip
     for parts, who in sorted(names, key=lambda each: -len(each[0])):

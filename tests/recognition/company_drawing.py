@@ -11,7 +11,7 @@ from tests.recognition.observations import ROBOT
 from tests.recognition.timeline import CALLED, LISTENING, NAMES, OTHER, Join, Span, Turn
 
 CALLS = (
-    "{}, {}", "{} {}", "{1}, {0}", "stop {0}", "{1}, {0}!",
+    "{}, {}", "{} {}", "{1}, {0}", "stop {0}", "Hey {0}, {1}", "hello {0}, {1}", "{0}さん、見て", "{1}, {0}!",
     "{0}、見て", "赤いのを取って、{0}。", "{0}、赤いのを取って。",
 )  # fmt: skip
 """Words that call somebody, and say something."""
