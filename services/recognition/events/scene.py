@@ -136,6 +136,8 @@ class SessionScene:
         self.gaze = GazeState()
         self.robot_spoken: Spoken | None = None
         """What the robot says now."""
+        self.turn: tuple[str, Addressees] | None = None
+        """The robot's turn that has not ended, and to whom it is."""
         self.head_owner = Claim(kind="none", priority=0)
         self.people_in_world: frozenset[str] = frozenset()
         self.covered = Covered(frozenset())

@@ -85,8 +85,6 @@ class Session:
         """The robot's actions."""
         self._addressed: Latest[str, Addressees] = Latest(BLOCKS_KEPT)
         """To whom the robot speaks in each block."""
-        self._turn: tuple[str, Addressees] | None = None
-        """The robot's turn that has not ended, and to whom it is."""
         self._takes: dict[type, Callable[[Any, Seconds], object]] = {
             ActionBegan: self._begins, ActionEnded: self._ends, GoesOn: self._goes_on,
             ActorFound: self._found, ActorLost: self._lost, World: self._people.see, Covered: self._hands_changed,
@@ -232,8 +230,8 @@ class Session:
         """
         for block, to in tuple(self._addressed.items()):
             self._addressed[block] = renamed_in(to, other, kept)
-        if self._turn is not None:
-            self._turn = self._turn[0], renamed_in(self._turn[1], other, kept)
+        if self.scene.turn is not None:
+            self.scene.turn = self.scene.turn[0], renamed_in(self.scene.turn[1], other, kept)
         self._people.join(other, kept, at, speaks=speaks)
         self._lose_untold(other, at)
         return self._take()
@@ -299,7 +297,7 @@ class Session:
         block = behavior.rpartition(":")[0]
         if block in self._addressed:
             return self._addressed[block]
-        return None if self._turn is None else self._turn[1]
+        return None if self.scene.turn is None else self.scene.turn[1]
 
     def announce(self, observation: Observation) -> None:
         """Learn to whom a block of the robot is. It may be called before the observation itself is fed."""
@@ -504,12 +502,12 @@ class Session:
     def _opens(self, turn: str, addressee: str) -> None:
         """Note a turn of the robot that goes on over several blocks."""
         if turn and addressee:
-            before = self._turn[1] if self._turn is not None and self._turn[0] == turn else frozenset()
-            self._turn = (turn, before | {addressee})
+            before = self.scene.turn[1] if self.scene.turn is not None and self.scene.turn[0] == turn else frozenset()
+            self.scene.turn = (turn, before | {addressee})
 
     def _closes(self, turn: str) -> None:
-        if self._turn is not None and self._turn[0] == turn:
-            self._turn = None
+        if self.scene.turn is not None and self.scene.turn[0] == turn:
+            self.scene.turn = None
 
     def _cancel(self, cancel: Cancel, at: Seconds) -> None:
         event, _ = self._live.pop(cancel.id, (None, None))

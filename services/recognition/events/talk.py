@@ -166,10 +166,13 @@ class Talk(KindRecognizer):
         is_into_words = said is not None and said.since <= at
         is_to_person = said is not None and said.is_to(self.id)
         speech.is_beside = is_into_words and not is_to_person
-        is_into_turn = is_into_words and is_to_person if self._line else self._conversation.is_into_turn(at)
+        is_in_pause = self.asked_since < inf and self._scene.turn is not None and self.id in self._scene.turn[1]
+        may_be_in_turn = (is_into_words and is_to_person) or is_in_pause
+        is_into_turn = may_be_in_turn if self._line else self._conversation.is_into_turn(at)
         is_line = self._scene.lines.get(self.id) == at
         speech.may_be_noise = self._scene.is_worded and not (is_line or says_words(speech.words))
         speech.is_into_turn = is_into_turn
+        speech.is_open = is_into_turn or speech.is_beside
         self._find(speech, at)
         self._may_interrupt(speech, face, at)
         if not self._line:
@@ -457,6 +460,7 @@ class Talk(KindRecognizer):
     def _address(self, speech: OwnSpeech, to: Addressees, at: Seconds) -> None:
         speech.to = to
         if self._scene.robot not in to:
+            speech.is_open = False
             self._writer.decide_interjection(self.id, speech.since, "other", at)
         elif speech.until is None:
             self._may_interrupt(speech, "", at)
@@ -474,7 +478,9 @@ class Talk(KindRecognizer):
         if speech.is_to(self._scene.robot):
             speech.is_heard = True
             self._conversation.speaks(speech.part, beside=speech.is_beside)
-            self._is_known_speech(speech, is_known=not self._conversation.listener.listens_to(speech.part))
+            is_sign = self._conversation.listener.listens_to(speech.part)
+            speech.is_open &= is_sign
+            self._is_known_speech(speech, is_known=not is_sign)
 
     def _decide(self, speech: OwnSpeech, at: Seconds) -> None:
         """Decide what the sound is, by what is known: nothing, if it is over and has no words; else to whom it is."""
@@ -484,7 +490,7 @@ class Talk(KindRecognizer):
         speech.is_decided = True
         self._is_known_speech(speech, is_known=is_judged_here)
         if is_noise:
-            speech.is_noise, speech.to = True, NOBODY
+            speech.is_noise, speech.is_open, speech.to = True, False, NOBODY
             self._writer.decide_interjection(self.id, speech.since, "noise", at)
         elif speech.to is None:
             self._address(speech, to, at)
