@@ -344,9 +344,6 @@ class SessionScene:
         self._speakers.add(actor)
         self.floor_changes += 1
 
-    def is_speaking(self, actor: str) -> bool:
-        return actor in self._speakers
-
     def falls_silent(self, actor: str, at: Seconds) -> None:
         if actor in self._speakers:
             self._speakers.discard(actor)

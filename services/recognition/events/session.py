@@ -161,7 +161,7 @@ class Session:
         if began.actor == self.robot:
             self._robot_begins(began, at)
         else:
-            by_look = began.action == "look" and not self.scene.is_speaking(began.actor)
+            by_look = began.action == "look" and began.actor not in self.scene.unknown
             self._people.observe(began.actor, at, lambda person: person.begins(began, at), by_look=by_look)
 
     def _ends(self, ended: ActionEnded, at: Seconds) -> None:

@@ -5,7 +5,12 @@ where recognizers tell words, these tell whether a sound is speech at all: a cou
 the robot says or asks meanwhile may be the answer to it. So from such a speech on everything waits in line, and is
 told in the order in which it happened, with its own times: what is known late has happened early.
 
-A sound into the robot's own words is decided by the conversation, which knows what else it may be (`listener_sign`).
+Into the robot's words it is no other, only that the robot waits: it falls silent for what may be for it (`open`), so
+that nothing is waited for longer than it has to be. To whom a sign of a listener is, and its words, are known here;
+what it is says the conversation, which knows what else it may be (`listener_sign`).
+
+The person's latest speeches are remembered. Of what nothing has been told, words that come late may say anything: to
+whom it was, and that it was no noise. Of the rest they correct what the conversation has taken it for (`listener`).
 """
 
 from collections import deque
