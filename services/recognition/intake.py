@@ -223,7 +223,8 @@ class Intake:
         self._tell_again(join.before, join.name)
         if kept != other:
             going = self._reports.join(other, kept)
-            self._note(self._recognizer.join(other, kept, now))
+            speaks = any(each.began.action == "speak" for each in going)
+            self._note(self._recognizer.join(other, kept, now, speaks=speaks))
             for each in going:
                 self._feed(each, now)
         session.scene.call(kept, other, join.before, join.name)
@@ -252,11 +253,10 @@ class Intake:
         """Tell what was told of a person by another name by this one, as far as it is remembered."""
         at, out = Stamp(self._clock.name, self._now), self._outputs
         for id, before in tuple(self._told.items()):
-            if before.person(self._robot) == other:
-                event = self._told[id] = self._identities.outward(
-                    replace(self._identities.inward(before), at=at, retold=True)
-                )
-                out.append(PublishMessage(keys.connection_event(name, event.kind), event))
+            event = self._identities.outward(self._identities.inward(before))
+            if event is not before and event != before:
+                event = self._told[id] = replace(event, at=at, retold=True)
+                out.append(PublishMessage(keys.connection_event(event.person(self._robot), event.kind), event))
         for message in self._open_events.join(other, name, at):
             out.append(PublishMessage(keys.open_events(message.actor), message))
         self._statistics.join(other, name, self._now)

@@ -138,17 +138,17 @@ class Recognizer:
         }
         return {id: max(much, default=None) for id, much in known.items()}
 
-    def join(self, other: str, kept: str, at: Seconds) -> list[Result]:
+    def join(self, other: str, kept: str, at: Seconds, *, speaks: bool) -> list[Result]:
         """Take two persons for one, who is `kept` from now on: see `Session.join`."""
         self._attention.forget(other)
         self._interrupted.forget(other)
-        self._words.forget(other)
+        self._words.join(other, kept)
 
         def name(id: str) -> str:
             return kept if id == other else id
 
         self._waiting = [(when, number, renamed(waiting, name)) for when, number, waiting in self._waiting]
-        return self._told([*self.session.join(other, kept, at)])
+        return self._told([*self.session.join(other, kept, at, speaks=speaks)])
 
     def lose_track(self, person: str, at: Seconds) -> list[Result]:
         """Begin anew with this person after a failure: see `Session.lose_track`."""

@@ -13,7 +13,7 @@ from msgspec.structs import astuple
 
 from engage_hri.schemas.recognition import ConnectionEvent
 from tests.recognition.observations import ROBOT
-from tests.recognition.timeline import LIMIT, LISTENING, Absence, Drawing, Instant, Span, Timeline, Turn
+from tests.recognition.timeline import LIMIT, LISTENING, Absence, Instant, Span, Timeline, Turn
 
 BRIEF = 0.8
 """Longest speech of a listener whose words nobody tells."""
@@ -25,7 +25,7 @@ LONGEST_SOUND_TOLD = 15.0
 THIRD_TURN = 1.5
 FACE_GRACE = 2.0
 ROUND = 1e-6
-BEFORE = (-1.0, 0)
+BEFORE = (-100.0, 0)
 LAST = 10**9
 """After all else that happens at a time."""
 
@@ -56,7 +56,7 @@ class Side:
         """The robot's last turn, if nobody has answered it in time."""
         self.cut_into: Span | None = None
         """The person's words into which the robot has begun its answer."""
-        self.third_until = -1.0
+        self.third_until = BEFORE[0]
         self.answers_until = BEFORE
         """End of the person's last answer: what begins before it is part of it."""
 
@@ -82,9 +82,9 @@ class Coder:
             for side in self._sides.values():
                 self._expire(side, _known(act)[0])
             if isinstance(act, Turn):
-                self._robot(self._sides[act.to], act)
+                self._robot_speaks(act)
                 for side in self._sides.values():
-                    if side.person != act.to:
+                    if side.person not in act.to:
                         self._listens_beside(side, act)
             elif isinstance(act, Absence):
                 self._leaves(self._sides[act.who], act)
@@ -114,8 +114,8 @@ class Coder:
     def _note(self, kind: str, initiator: str, responder: str, at: float, state: str, **more: Any) -> None:
         self._events[kind, initiator, responder, at] = Coded(kind, initiator, responder, at, state, **more)
 
-    def _pair_of(self, turn: Turn, state: str, **more: Any) -> None:
-        self._note("adjacency_pair", ROBOT, turn.to, turn.since[0], state, **more)
+    def _pair_of(self, turn: Turn, side: Side, state: str, **more: Any) -> None:
+        self._note("adjacency_pair", ROBOT, side.person, turn.since[0], state, **more)
 
     def _own_pair(self, side: Side, state: str, **more: Any) -> None:
         self._note("adjacency_pair", side.person, ROBOT, side.own[0].since[0], state, **more)
@@ -126,22 +126,38 @@ class Coder:
     def _expire(self, side: Side, now: float) -> None:
         """Let the limits pass that are over before `now`."""
         if side.asked is not None and side.asked.until[0] + self._limit + ROUND < now:
-            self._pair_of(side.asked, "failed")
+            self._pair_of(side.asked, side, "failed")
             side.asked, side.unanswered = None, side.asked
         if side.own and side.own[-1].until[0] + self._limit + ROUND < now:
             self._own_pair(side, "failed")
 
     def _leaves(self, side: Side, absence: Absence) -> None:
         if side.asked is not None:
-            self._pair_of(side.asked, "failed")
+            self._pair_of(side.asked, side, "failed")
         if side.own:
             self._own_pair(side, "withdrawn")
         side.asked = side.unanswered = None
 
     # -- the robot ------------------------------------------------------------------------------------------------
 
-    def _robot(self, side: Side, turn: Turn) -> None:
-        """Read a turn of the robot: it answers who waits, or still speaks; and what is said and shown into it."""
+    def _robot_speaks(self, turn: Turn) -> None:
+        """Read a turn of the robot. Who answers into it first has answered for all who are silent."""
+        answers = [(side, self._robot(side, turn)) for side in map(self._sides.__getitem__, turn.to)]
+        given = [(answer.since, answer) for _, answer in answers if answer is not None]
+        for side, answer in answers if given else ():
+            if answer is None:
+                self._is_answered(side, turn, "succeeded", min(given, key=lambda each: each[0])[1])
+
+    def _is_answered(self, side: Side, turn: Turn, state: str, answer: Span) -> None:
+        """Note that what a person was asked has been answered by another."""
+        self._pair_of(turn, side, state, delay=answer.since[0] - turn.until[0], answered_by=answer.who)
+        side.asked = side.unanswered = None
+
+    def _robot(self, side: Side, turn: Turn) -> Span | None:
+        """Read a turn of the robot: it answers who waits, or still speaks; and what is said and shown into it.
+
+        Returns the answer into a turn that asks; None: there is none.
+        """
         was_waiting = bool(side.own)
         was_over = was_waiting and side.own[-1].until < turn.since
         if was_waiting:
@@ -156,7 +172,7 @@ class Coder:
         elif turn.kind == "replies" and self._is_listening(side, turn):
             self._note("backchannel", side.person, ROBOT, turn.since[0], "completed")
         if turn.kind == "asks" and side.asked is not None:
-            self._pair_of(side.asked, "superseded")
+            self._pair_of(side.asked, side, "superseded")
             side.asked = None
         side.unanswered = None
         answers = self._listens(side, turn)
@@ -166,12 +182,14 @@ class Coder:
             kept = [each for each in answers if not (was_waiting and self._is_decided(each, turn))]
             self._turns |= {id(each) for each in kept}
         elif answer is not None:
-            self._pair_of(turn, "succeeded", delay=answer.since[0] - turn.until[0])
-            side.answers_until, side.third_until = answer.until, -1.0
+            self._pair_of(turn, side, "succeeded", delay=answer.since[0] - turn.until[0])
+            side.answers_until, side.third_until = answer.until, BEFORE[0]
+            return answer
         elif turn.is_aborted:
-            self._pair_of(turn, "withdrawn")
+            self._pair_of(turn, side, "withdrawn")
         else:
             side.asked = turn
+        return None
 
     def _listens(self, side: Side, turn: Turn) -> list[Span]:
         """Read what a person does in the robot's turn. Returns what takes the floor."""
@@ -232,12 +250,14 @@ class Coder:
                 sign = [each for each in sign if self._is_shown_to_robot(side, each)]
                 heard = max(speech.since[0] + WORDS_WAIT, speech.until[0] + WORDS_AFTER)
                 is_in_time = speech.known is not None and speech.known[0] <= heard + ROUND
-                is_known = self._is_last(speech) and (is_in_time or not any(map(self._shows, sign)))
+                # Until it is known to whom it is, its words are waited for, also if the next sound has begun.
+                is_waited_for = is_in_time and (self._timeline.tells != "early" or self._is_last(speech))
+                is_known = is_waited_for or (self._is_last(speech) and not any(map(self._shows, sign)))
                 is_noise = self._timeline.is_worded and not is_known
                 shown = sorted(each.since for each in sign if self._shows(each))
                 shown = shown if is_noise else [speech.since]
                 is_brief = speech.seconds <= (self._longest_sound if self._timeline.is_worded else BRIEF) + ROUND
-                takes_floor = speech.words not in LISTENING if is_known else not is_brief
+                takes_floor = speech.is_line or (speech.words not in LISTENING if is_known else not is_brief)
                 if speech.until > until or takes_floor:
                     self._turns.add(id(speech))
                 elif shown:
@@ -254,7 +274,7 @@ class Coder:
         if speech.known is None:
             return False
         own = [each.since for each in self._timeline.spans if _speaks_to_robot(each, speech.who)]
-        robots = [since for turn in self._timeline.turns if turn.to == speech.who for since, _ in turn.speech]
+        robots = [since for turn in self._timeline.turns if speech.who in turn.to for since, _ in turn.speech]
         return not any(speech.since < since < speech.known for since in (*own, *robots))
 
     def _is_listening(self, side: Side, turn: Turn) -> bool:
@@ -325,6 +345,8 @@ class Coder:
 
         is_noise: nothing is told of the sign unless words come, so that these may come after the turn.
         """
+        if speech.is_line:
+            return True
         is_open = turn.kind == "asks" or speech.seconds <= WORDS_WAIT + ROUND
         is_noise &= speech.seconds <= WORDS_WAIT + ROUND
         if is_open and (self._is_known_in(speech, turn) or (is_noise and self._is_last(speech))):
@@ -363,22 +385,34 @@ class Coder:
         if side.unanswered is not None and self._has_spoken(side.unanswered, sign):
             side.unanswered = None
         if side.asked is not None:
-            self._pair_of(side.asked, "succeeded", delay=at - side.asked.until[0])
-            side.asked, side.answers_until, side.third_until = None, sign.until, -1.0
+            turn = side.asked
+            self._pair_of(turn, side, "succeeded", delay=at - turn.until[0])
+            for other in self._sides.values():
+                if other is not side and other.asked is turn and not self._begins_too(other, sign):
+                    self._is_answered(other, turn, "succeeded", sign)
+            side.asked, side.answers_until, side.third_until = None, sign.until, BEFORE[0]
         elif sign.action == "speak" and (asked := self._asked_of_another(side, sign)) is not None:
-            turn = asked.asked
-            assert turn is not None
-            self._pair_of(turn, "preempted", delay=at - turn.until[0], answered_by=side.person)
-            asked.asked = side.unanswered = None
+            for other in self._sides.values():
+                if other.asked is asked:
+                    self._is_answered(other, asked, "preempted", sign)
+            side.unanswered = None
         elif side.unanswered is not None:
             turn, side.unanswered = side.unanswered, None
-            self._pair_of(turn, "failed", late=at - turn.until[0])
+            self._pair_of(turn, side, "failed", late=at - turn.until[0])
             side.answers_until = sign.until
         elif sign.action == "speak":
             if not side.own and at <= side.third_until + ROUND:
-                side.third_until = -1.0
+                side.third_until = BEFORE[0]
             else:
                 side.own.append(sign)
+
+    def _begins_too(self, side: Side, sign: Span) -> bool:
+        """True if a person begins to answer in the very instant of another's sign."""
+        signs = [each for each in self._timeline.spans if each.who == side.person and each.to == ROBOT]
+        return any(
+            each.action not in ("look", "act") and each.since[0] == sign.since[0] and not self._is_noise(each)
+            for each in signs
+        )
 
     def _has_spoken(self, asked: Turn, sign: Span) -> bool:
         """True if the robot has begun to say anything, to anybody, after nobody had answered this turn in time."""
@@ -387,15 +421,15 @@ class Coder:
             failed <= since[0] and since < sign.since for turn in self._timeline.turns for since, _ in turn.speech
         )
 
-    def _asked_of_another(self, side: Side, sign: Span) -> Side | None:
-        """Whom the robot has asked, and who has not answered yet when somebody else says this."""
-        asked = [each for each in self._sides.values() if each is not side and each.asked is not None]
+    def _asked_of_another(self, side: Side, sign: Span) -> Turn | None:
+        """What the robot has asked others who have not answered yet when somebody else says this."""
+        asked = [each.asked for each in self._sides.values() if each is not side and each.asked is not None]
         last = (side.own[-1].until if side.own else BEFORE)[0]
         at = sign.since[0]
-        waiting = [each for each in asked if last < each.asked.until[0] < at]
+        waiting = [each for each in asked if last < each.until[0] < at]
         if sign.known is not None and sign.known[0] > sign.until[0] + WORDS_AFTER:  # nobody waited for these words
-            waiting = [each for each in waiting if sign.known[0] <= each.asked.until[0] + self._limit]
-        return max(waiting, key=lambda each: each.asked.until, default=None)
+            waiting = [each for each in waiting if sign.known[0] <= each.until[0] + self._limit]
+        return max(waiting, key=lambda each: each.until, default=None)
 
 
 def _speaks_to_robot(each: Span, person: str) -> bool:
@@ -415,13 +449,20 @@ def as_told(events: Sequence[ConnectionEvent]) -> list[Coded]:
         if each.kind not in ("adjacency_pair", "backchannel"):
             continue
         state = "completed" if each.kind == "backchannel" else each.state
-        is_late = each.retold and each.state == "failed"
+        is_late = each.retold and each.state == "failed" and each.response is not None
         if before is not None and before.state != "started" and not is_late:
             continue
         late = each.delay if is_late else None
         delay = each.delay if state in ("succeeded", "preempted") else None
         lives[each.id] = Coded(
-            each.kind, each.initiator, each.responder, each.started.seconds, state, delay, each.answered_by, late
+            each.kind,
+            each.initiator,
+            each.responder,
+            each.started.seconds,
+            state,
+            delay,
+            "" if each.answered_by == each.responder else each.answered_by,
+            late,
         )
     return sorted(lives.values())
 
@@ -431,13 +472,6 @@ def rounded(events: Sequence[Coded]) -> list[Coded]:
     return [
         Coded(*(round(value, 5) if isinstance(value, float) else value for value in astuple(each))) for each in events
     ]
-
-
-def differences(seed: int) -> tuple[int, list[str]]:
-    """Number of events of a drawn timeline, and what only one of recognition and the coder has."""
-    timeline = Drawing(seed).timeline
-    told, coded = rounded(as_told(timeline.told())), rounded(Coder(timeline).events())
-    return only_one_has(told, coded)
 
 
 def only_one_has(told: Sequence[object], coded: Sequence[object]) -> tuple[int, list[str]]:

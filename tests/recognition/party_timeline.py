@@ -40,7 +40,7 @@ def timeline(play: Play) -> Timeline:
         found.spans.append(speech)
     for number, asked in enumerate(play.questions):
         since, until = (asked.began, BEFORE), (asked.ended, BEFORE)
-        found.turns.append(Turn(f"turn{number}", "asks", asked.to, [(since, until)], until))
+        found.turns.append(Turn(f"turn{number}", "asks", (asked.to,), [(since, until)], until))
     return found
 
 

@@ -8,11 +8,13 @@ from collections.abc import Callable
 import pytest
 
 from tests.random_cases import share_of
-from tests.recognition import coder, gaze_coder, party_timeline
+from tests.recognition import gaze_coder, judged_talk, party_timeline
 
 Differences = Callable[[int], tuple[int, list[str]]]
 JUDGES: dict[str, tuple[Differences, int]] = {
-    "talk": (coder.differences, 1000),
+    "talk": (judged_talk.differences, 1000),
+    "company": (judged_talk.in_company, 360),
+    "joins": (judged_talk.with_joins, 360),
     "looks": (gaze_coder.differences, 1000),
     "parties": (party_timeline.differences, 60),
 }

@@ -206,6 +206,22 @@ what she says to another into the question is no answer, if perception says so, 
     8 ann said 7; 20 end
     robot: started 1, succeeded 7 after 1, completed 8
 
+... also if it was taken for noise before they came
+    0 ann said 0; 1 robot asks ann 5; 2 ann looks robot; 3 ann speaks 1; 5 ann said 3 words=bob,the,red; 20 end
+    robot: started 1, failed 10
+
+who interrupts before the turn is cut off has answered, also if it is not decided yet, and for all who were asked
+    0 ann said 0; 1 robot asks ann,bob 2 cut=1; 2 bob looks robot; 2.2 bob speaks 0.4; 3.2 bob said 2.2; 20 end
+    robot: started 1, succeeded 3 after -0.8 by bob, completed 3 by bob
+    robot: started 1, succeeded 3 after -0.8 by bob, completed 3 by bob
+
+of two who interrupt the first answers for who is silent, also if it is decided later
+    0 ann said 0; 1 robot asks ann,bob,cy 5; 2 ann looks robot; 2 bob looks robot; 3 ann speaks 4; 4 bob speaks 0.5
+    4.6 bob said 4 words=stop; 7.1 ann said 3 words=wait,a,bit; 20 end
+    robot: started 1, succeeded 6 after -3 by ann, completed 7 by ann, completed 7.1 by ann
+    robot: started 1, succeeded 6 after -2 by bob, completed 6 by bob
+    robot: started 1, succeeded 6 after -3 by ann, completed 6 by ann, completed 7.1 by ann
+
 a laugh after a question is no answer
     0 ann said 0; 1 robot asks ann 2; 2 ann looks robot; 3.5 ann speaks 0.8; 20 end
     robot: started 1, failed 7
@@ -262,7 +278,7 @@ who stands by and says "uh-huh" to the robot listens
 ... or goes on when the robot is silent
     0 ann said 0; 1 robot asks ann 4; 1 bob looks robot; 4.8 bob speaks 0.4; 5.6 bob said 4.8 words=uh-huh; 20 end
     robot: started 1, failed 9
-    bob: started 4.8, started 5.6, failed 9.2
+    bob: started 4.8, failed 9.2
 
 words that come late after a second speech are those of the first
     0 ann said 0; 1 robot asks ann 2; 3.5 ann speaks 0.3; 5.4 ann speaks 1; 6 ann said 3.5; 6.5 ann said 5.4; 30 end

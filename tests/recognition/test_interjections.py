@@ -125,7 +125,7 @@ def test_each_is_told_open_and_then_decided_in_time(seed: int) -> None:
         ("bob", None, []),
         ("bob", ROBOT, [("open", 2.3), ("interruption", 2.8)]),
         ("", "bob", [("open", 2.0), ("other", 5.0)]),
-        ("", None, [("open", 2.0), ("interruption", 2.8)]),
+        ("", None, [("open", 2.0), ("interruption", 5.0)]),
     ],
 )
 def test_who_looks_at_a_neighbor_does_not_hold_the_robot(
@@ -174,6 +174,29 @@ def test_who_looks_at_the_robot_and_says_something_to_a_neighbor_holds_it_until_
     assert [each.named for each in log.session.scene.ended() if each.actor == "ann"] == [{"bob"}]
 
 
+@pytest.mark.parametrize("goes_on", [False, True])
+@pytest.mark.parametrize("to", [frozenset({"bob"}), None])
+def test_stop_is_decided_as_soon_as_it_is_known_whoever_talks_beside_it(
+    to: frozenset[str] | None, *, goes_on: bool
+) -> None:
+    """Perception may have told addressees before (`to`), and two talk with each other all the time."""
+    log = Log("ann", "bob", "cy", adjacency_pair_limit=4.0)
+    log.feed(Worded(actor="ann", since=0.0, text="good morning", to=to), 0.1)
+    log.looks("ann", ROBOT, 0.5)
+    log.looks("bob", "cy", 0.5)
+    log.begins(ROBOT, "speak", 1.0, behavior="block-1:speech-1")
+    log.requests_event("adjacency_pair", 1.0, turn="turn-1", responder="ann")
+    log.begins("bob", "speak", 2.5)
+    log.begins("ann", "speak", 3.0)
+    if not goes_on:
+        log.ends("ann", "speak", 3.4)
+    log.feed(Worded(actor="ann", since=3.0, text="stop"), 3.5)
+    log.until(3.6)
+
+    told = [(each.reading, each.at.seconds) for each in log.effects if isinstance(each, Interjection)]
+    assert told == [("open", 3.0), ("interruption", 3.5)]
+
+
 def test_words_beside_the_nod_that_answers_are_of_that_answer() -> None:
     log = Log(adjacency_pair_limit=4.0)
     log.begins(ROBOT, "speak", 1.0, behavior="block-1:speech-1")
@@ -184,7 +207,9 @@ def test_words_beside_the_nod_that_answers_are_of_that_answer() -> None:
     log.signals("ended", 3.0)
     log.ends(HUMAN, "nod", 3.2)
     log.ends(HUMAN, "speak", 4.0)
+    log.feed(Worded(actor=HUMAN, since=2.8, text="yes, the red one"), 4.3)
     log.until(60.0)
 
+    assert (log.last("ap-1").response, log.last("ap-1").words) == ("nod", "yes, the red one")
     told = [(each.since.seconds, each.reading) for each in log.effects if isinstance(each, Interjection)]
-    assert told == [(2.8, "open"), (2.8, "answer")]
+    assert list(dict.fromkeys(told)) == [(2.8, "open"), (2.8, "answer")]

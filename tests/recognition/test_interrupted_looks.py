@@ -91,6 +91,12 @@ def test_a_look_that_follows_again_at_once_has_gone_on():
     ]  # fmt: skip
 
 
+def test_an_end_that_comes_twice_is_no_more_certain():
+    once = (began(HUMAN, 1.0, ROBOT), ended(HUMAN, 1.5, ROBOT), began(HUMAN, 1.5 + LOOK_BREAK - 0.05, ROBOT))
+
+    assert told(*once[:2], *once[1:]) == told(*once)
+
+
 def test_a_look_that_follows_again_later_is_another():
     pause = (ended(HUMAN, 1.5, ROBOT), began(HUMAN, 1.7, ROBOT))
 

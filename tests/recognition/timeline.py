@@ -1,23 +1,28 @@
-"""Talk of one to five people and the robot, drawn at random and known from beginning to end.
+"""Talk of one to five people and the robot, known from beginning to end.
 
 What each does has a beginning and an end. They are instants: the time, and the order in which what happens at one
 time is observed. `Timeline.told` plays it to recognition; `coder.py` says what a coder of the whole makes of it.
 """
 
-import random
 from collections.abc import Callable, Iterator
 
 from msgspec import Struct, field
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Action, TurnSignal
-from engage_hri.schemas.recognition import ConnectionEvent, SignalTurn
-from engage_hri.services.recognition.events.scene import Worded
-from tests.recognition.observations import PIECES, ROBOT, Log, request_event, stamp
+from engage_hri.schemas.perception import ActorLost
+from engage_hri.schemas.recognition import SignalTurn
+from engage_hri.schemas.world import World
+from tests.recognition.heard_log import HeardLog
+from tests.recognition.observations import PIECES, ROBOT, request_event, stamp, world
 
 NAMES = ("ann", "bob", "cy", "dee", "eve")
+CALLED = {"cy": "マリ", "dee": "Mary Ann"}
+"""By what name people are called beside their ids."""
+STRANGER = "zed"
+SAID_BEFORE = -59.0, -58.0
+"""What somebody says before all else, where words are told."""
 LIMIT = 4.0
-LATE_HEAD = 0.6
-"""Seconds by which the head of who speaks is late at most: heads turn with the voice, or after it."""
 Instant = tuple[float, int]
 """A time, and a place in the order of what happens then."""
 LISTENING = ("uh-huh", "yes, yes, okay", "genau")
@@ -25,9 +30,9 @@ OTHER = ("stop", "what about the red one", "nein warte")
 
 
 class Span(Struct):
-    """What somebody does. to: for whom it is; of a look, what it is at. words: "": none.
+    """What somebody does. to: for whom it is; of a look, what it is at; "": nobody. words: "": none.
 
-    known: when the words are told; None: never.
+    known: when the words are told; None: never. told: for whom it is by perception; "": it does not say.
     """
 
     who: str
@@ -37,6 +42,15 @@ class Span(Struct):
     to: str = ROBOT
     words: str = ""
     known: Instant | None = None
+    told: str = ""
+    heard: tuple[tuple[Instant, str], ...] = ()
+    """Partial words, which change nothing."""
+    is_alone: bool = False
+    """True if nothing but the words tells of it; those of a typed line take no time."""
+
+    @property
+    def is_line(self) -> bool:
+        return self.is_alone and self.since[0] == self.until[0]
 
     @property
     def seconds(self) -> float:
@@ -44,14 +58,14 @@ class Span(Struct):
 
 
 class Turn(Struct):
-    """The robot's words to one person. kind: `asks` opens a pair, `replies` answers one.
+    """The robot's words to one person or several. kind: `asks` opens a pair with each, `replies` answers.
 
     speech: when it speaks; of a turn that asks `until` is its end, after the last word.
     """
 
     id: str
     kind: str
-    to: str
+    to: tuple[str, ...]
     speech: list[tuple[Instant, Instant]]
     until: Instant
     is_aborted: bool = False
@@ -69,6 +83,21 @@ class Absence(Struct):
     until: Instant
 
 
+class Join(Struct):
+    """Somebody is told of by another id until it becomes known who it is.
+
+    is_known: the person is known by the own id, too, for as long. goes_on: the other id is told further on.
+    changes: when the id changes; until then it is the own one. None: it does not.
+    """
+
+    who: str
+    id: str
+    at: Instant
+    is_known: bool = False
+    goes_on: bool = False
+    changes: Instant | None = None
+
+
 class Timeline(Struct):
     """All that happens. is_worded: recognizers tell words. tells: "": nobody tells to whom people speak."""
 
@@ -78,23 +107,64 @@ class Timeline(Struct):
     away: list[Absence] = field(default_factory=list)
     is_worded: bool = False
     tells: str = ""
+    joins: list[Join] = field(default_factory=list)
+    is_first: bool = False
+    """True if nobody has told words before the first of these."""
+    unseen: frozenset[str] = frozenset()
+    """People who are found, but stand in no world."""
 
-    def told(self) -> list[ConnectionEvent]:
+    def delay(self, seconds: float) -> None:
+        """Let all happen later."""
+
+        def later(at: Instant) -> Instant:
+            return round(at[0] + seconds, 6), at[1]
+
+        for one in self.spans:
+            one.since, one.until, one.known = later(one.since), later(one.until), one.known and later(one.known)
+            one.heard = tuple((later(at), text) for at, text in one.heard)
+        for turn in self.turns:
+            turn.speech = [(later(since), later(until)) for since, until in turn.speech]
+            turn.until = later(turn.until)
+        for each in self.away:
+            each.since, each.until = later(each.since), later(each.until)
+
+    def told(self) -> HeardLog:
         """All that recognition tells of it."""
-        log = Log(*self.people, adjacency_pair_limit=LIMIT)
-        if self.is_worded:
-            for person in self.people:
-                to = frozenset((ROBOT,)) if self.tells else None
-                log.feed(Worded(actor=person, since=0.0, text="so", to=to), 0.0)
-        steps = sorted(self._steps(log), key=lambda each: each[:2])
-        for (at, _), _, step in steps:
-            while (due := log.session.deadline) is not None and due < at - 1e-6:
-                log.until(due)
+        log = HeardLog(LIMIT)
+        log.ids = {each.who: each.id for each in self.joins if each.changes is None}
+        is_before = self.is_worded and not self.is_first
+        log.owners = {each.id: each.who for each in self.joins}
+        seen = [log.id(each) for each in self.people if each not in self.unseen]
+        known = [each.who for each in self.joins if each.is_known]
+        log.take(_room(*seen, *known, *((STRANGER,) if is_before else ())), -60.0)
+        for one in self.unseen:
+            log.found(one, -60.0)
+        if is_before:
+            self._has_spoken(log, [*seen, *known])
+        for (at, _), _, step in sorted(self._steps(log), key=lambda each: each[:2]):
+            log.until(at - 1e-6)
             step()
         log.until(10_000.0)
-        return log.events
+        return log
 
-    def _steps(self, log: Log) -> Iterator[tuple[Instant, int, Callable[[], object]]]:
+    def _has_spoken(self, log: HeardLog, people: list[str]) -> None:
+        """Have somebody say something to the robot, and go: so it is known that words are told, and addressees."""
+        to = frozenset((ROBOT,)) if self.tells else None
+        steps: list[tuple[float, Callable[[float], None]]] = [
+            (-60.0, lambda at: log.found(STRANGER, at)),
+            (SAID_BEFORE[0], lambda at: log.begins(STRANGER, "speak", at)),
+            (SAID_BEFORE[1], lambda at: log.ends(STRANGER, "speak", at)),
+            (-57.9, lambda at: log.hears(STRANGER, *SAID_BEFORE, "so", at, to=to)),
+            (-40.0, lambda at: log.take(_room(*people), at)),
+            (-40.0, lambda at: log.take(ActorLost(actor=STRANGER, at=stamp(at), left=True), at)),
+        ]  # fmt: skip
+        for at, step in steps:
+            log.until(at - 1e-6)
+            step(at)
+        log.until(0.0)
+        log.told.clear()
+
+    def _steps(self, log: HeardLog) -> Iterator[tuple[Instant, int, Callable[[], object]]]:
         for one in self.spans:
             yield from _of_span(log, one, self)
         for turn in self.turns:
@@ -102,29 +172,48 @@ class Timeline(Struct):
         for each in self.away:
             yield each.since, 0, lambda each=each: log.lost(each.who, each.since[0])
             yield each.until, 0, lambda each=each: log.found(each.who, each.until[0])
+        for join in self.joins:
+            yield from _of_join(log, join)
 
 
-def _of_span(log: Log, one: Span, timeline: Timeline) -> Iterator[tuple[Instant, int, Callable[[], object]]]:
+def _of_join(log: HeardLog, join: Join) -> Iterator[tuple[Instant, int, Callable[[], object]]]:
+    if (changes := join.changes) is not None:
+        yield changes, 0, lambda: log.lost(join.who, changes[0])
+        yield join.at, 0, lambda: log.ids.update({join.who: join.id})
+    yield join.at, 1, lambda: log.join(join.who, join.at[0], goes_on=join.goes_on)
+
+
+def _room(*people: str) -> World:
+    """The world with these people and their names."""
+    seen = world(*people)
+    entities = (replace(each, name=CALLED.get(each.id, "")) for each in seen.entities)
+    return replace(seen, entities=tuple(entities))
+
+
+def _of_span(log: HeardLog, one: Span, timeline: Timeline) -> Iterator[tuple[Instant, int, Callable[[], object]]]:
     target = one.to if one.action == "look" else PIECES[0] if one.action == "point" else ""
-    yield one.since, 1, lambda: log.begins(one.who, one.action, one.since[0], target)
-    yield one.until, 0, lambda: log.ends(one.who, one.action, one.until[0], target)
-    if one.action == "speak" and (one.known is not None or timeline.tells):
+    since, until = one.since[0], one.until[0]
+    if not one.is_alone:
+        yield one.since, 1, lambda: log.begins(one.who, one.action, since, target)
+        yield one.until, 0, lambda: log.ends(one.who, one.action, until, target)
+    for at, text in one.heard:
+        yield at, 3, lambda at=at, text=text: log.hears(one.who, since, at[0], text, at[0], final=False)
+    if one.action == "speak" and (one.known is not None or one.told):
         known = one.known or one.until
-        to = frozenset((one.to,)) if timeline.tells else None
-        if timeline.tells == "early":
-            told = Worded(actor=one.who, since=one.since[0], text="", to=to)
-            yield one.since, 2, lambda: log.feed(told, one.since[0])
+        to = frozenset((one.told,)) if one.told else None
+        if timeline.tells == "early" and one.told:
+            yield one.since, 2, lambda: log.hears(one.who, since, until, "", since, to=to, final=False)
         if one.known is not None or timeline.tells == "late":
-            words = Worded(actor=one.who, since=one.since[0], text=one.words, to=to)
-            yield known, 1, lambda: log.feed(words, known[0])
+            yield known, 1, lambda: log.hears(one.who, since, until, one.words, known[0], to=to)
 
 
-def _of_turn(log: Log, turn: Turn) -> Iterator[tuple[Instant, int, Callable[[], object]]]:
+def _of_turn(log: HeardLog, turn: Turn) -> Iterator[tuple[Instant, int, Callable[[], object]]]:
     (at, _), (over, _) = turn.since, turn.until
 
     def signal(kind: str, when: float) -> None:
-        signaled = TurnSignal(id="e", turn=turn.id, signal=kind, actor=turn.to)  # type: ignore[arg-type]
-        log.feed(SignalTurn(id=f"{turn.id}/{kind}", requester="realizer", signal=signaled, at=stamp(when),
+        to = log.id(turn.to[0]) if len(turn.to) == 1 else ""
+        signaled = TurnSignal(id="e", turn=turn.id, signal=kind, actor=to)  # type: ignore[arg-type]
+        log.take(SignalTurn(id=f"{turn.id}/{kind}", requester="realizer", signal=signaled, at=stamp(when),
                             block=turn.id), when)  # fmt: skip
 
     if turn.kind == "replies":
@@ -132,144 +221,20 @@ def _of_turn(log: Log, turn: Turn) -> Iterator[tuple[Instant, int, Callable[[], 
     else:
         kind = "adjacency_pair" if turn.kind == "asks" else "backchannel"
         name = turn.id if turn.kind == "asks" else ""
-        asked = request_event(kind, at, request=turn.id, block=turn.id, turn=name, responder=turn.to)
-        yield turn.since, 0, lambda: log.feed(asked, at)
+        for one in turn.to:
+            yield (
+                turn.since,
+                0,
+                lambda one=one: log.take(
+                    request_event(
+                        kind, at, request=f"{turn.id}/{one}", block=turn.id, turn=name, responder=log.id(one)
+                    ),
+                    at,
+                ),
+            )
     for since, until in turn.speech:
         yield since, 1, lambda since=since: log.begins(ROBOT, "speak", since[0], behavior=f"{turn.id}:s")
         yield until, 0, lambda until=until: log.ends(ROBOT, "speak", until[0], behavior=f"{turn.id}:s")
     if turn.kind == "asks":
         yield turn.until, 1, lambda: signal("aborted" if turn.is_aborted else "ended", over)
     yield turn.until, 2, lambda: log.block_ends(over, "interrupted" if turn.is_aborted else "done", turn.id)
-
-
-class Drawing:
-    """A timeline that is drawn. grid: all times are multiples of it, so that many are the same."""
-
-    def __init__(self, seed: int) -> None:
-        self._chance = chance = random.Random(seed)
-        self._grid = chance.choice((0.001, 0.1, 0.1))
-        self.timeline = Timeline(NAMES[: chance.choice((1, 1, 2, 3, 4, 5))], is_worded=chance.random() < 0.5)
-        if len(self.timeline.people) > 1:
-            self.timeline.tells = chance.choice(("early", "late", ""))
-            self.timeline.is_worded |= bool(self.timeline.tells)
-        self._end = chance.uniform(20.0, 60.0)
-        for person in self.timeline.people:
-            self._draw_presence(person)
-        for person in self.timeline.people:
-            self._draw_person(person)
-        self._draw_robot()
-
-    def _at(self, seconds: float) -> Instant:
-        return round(round(seconds / self._grid) * self._grid, 6), self._chance.randrange(1_000_000)
-
-    def _between(self, least: float, most: float) -> float:
-        return self._chance.uniform(least, most)
-
-    def _draw_presence(self, person: str) -> None:
-        if self._chance.random() < 0.2:
-            since = self._between(5.0, 50.0)
-            until = since + self._chance.choice((1.0, self._between(4.0, 12.0)))
-            self.timeline.away.append(Absence(person, self._at(since), self._at(until)))
-
-    def _is_away(self, person: str, since: float, until: float) -> bool:
-        away = [each for each in self.timeline.away if each.who == person]
-        return any(each.since[0] - 0.5 < until and since < each.until[0] + 0.5 for each in away)
-
-    def _draw_person(self, person: str) -> None:
-        """Speeches, with nods and points beside them, before and after."""
-        chance, at = self._chance, self._between(0.5, 5.0)
-        others = [each for each in self.timeline.people if each != person]
-        while at < self._end:
-            lasts = chance.choice((self._between(0.2, 0.8), 0.8, self._between(0.8, 1.5), self._between(1.0, 4.0)))
-            here = [each for each in others if not self._is_away(each, at - 3.0, at + lasts + 3.0)]
-            to = chance.choice((ROBOT, *here)) if chance.random() < 0.5 else ROBOT
-            if not self._is_away(person, at - 0.3, at + lasts + 0.3):
-                self._speak(person, to, at, lasts)
-                if to == ROBOT:
-                    self._gesture(person, at, at + lasts)
-            at += lasts + chance.choice((self._between(0.15, 1.0), self._between(0.5, 6.0), self._between(2.0, 10.0)))
-
-    def _speak(self, person: str, to: str, at: float, lasts: float) -> None:
-        chance, since, until = self._chance, self._at(at), self._at(at + lasts)
-        if until[0] - since[0] < 0.1:
-            return
-        since = since[0], NAMES.index(person)  # who is observed first of two that begin together, does not matter
-        one = Span(person, "speak", since, until, to)
-        if self.timeline.is_worded and chance.random() < 0.8:
-            one.words = chance.choice((*LISTENING, *OTHER) if one.seconds < 2.5 else OTHER)
-            is_alone = len(self.timeline.people) == 1
-            one.known = self._at(until[0] + (chance.choice((0.0, 0.1)) if is_alone or one.seconds < 1.3 else 0.0))
-            one.known = max(one.known, (until[0], until[1] + 1))
-        self.timeline.spans.append(one)
-        if len(self.timeline.people) > 1:
-            turns = since[0] + chance.choice((-0.05, self._between(0.0, min(LATE_HEAD, 0.45 * one.seconds))))
-            self.timeline.spans.append(Span(person, "look", (round(turns, 6), 0), (round(until[0] + 0.05, 6), 0), to))
-
-    def _gesture(self, person: str, since: float, until: float) -> None:
-        chance = self._chance
-        if chance.random() < 0.4:
-            return
-        action: Action = chance.choice(("nod", "nod", "shake", "point"))
-        begins = self._at(self._between(since, until))
-        ends = self._at(
-            min(begins[0] + self._between(0.2, 0.8), until + 0.05 if len(self.timeline.people) > 1 else 1e9)
-        )
-        if ends[0] - begins[0] >= 0.1:
-            self.timeline.spans.append(Span(person, action, begins, ends))
-
-    def _draw_robot(self) -> None:
-        """Turns, one after the other: some begin soon after somebody's words, or before these have ended."""
-        chance, at = self._chance, self._between(0.5, 4.0)
-        spoken = [each for each in self.timeline.spans if each.action == "speak" and each.to == ROBOT]
-        while at < self._end:
-            to, kind = chance.choice(self.timeline.people), chance.choice(("asks", "asks", "asks", "replies"))
-            following = [each for each in spoken if at + 0.5 < each.until[0] < at + 6.0]
-            if following and chance.random() < 0.6:
-                one = chance.choice(following)
-                to, at = (
-                    one.who,
-                    max(at, one.until[0] + chance.choice((self._between(-0.5, 2.0), self._between(0, 6.0)))),
-                )
-            waiting = [each for each in self.timeline.turns if at < each.until[0] + LIMIT]
-            if waiting and len(self.timeline.people) > 1:
-                kind = "asks"  # else it depends on what is known first: who answers, or that who was asked does not
-            speech, over = [], at
-            for _ in range(chance.choice((1, 1, 2)) if kind == "asks" else 1):
-                begins = self._at(over)
-                if len(self.timeline.people) > 1:  # not with somebody's words: that would be right either way
-                    begins = round(begins[0] + 0.003, 6), -1
-                over = begins[0] + self._between(0.5, 3.0)
-                speech.append((begins, self._at(over)))
-                over += self._between(0.2, 1.0)
-            last = speech[-1][1]
-            until = (last[0], last[1] + 1)
-            if kind == "asks" and chance.random() < 0.3:
-                until = max(until, self._at(last[0] + self._between(0.0, 0.5)))
-            if not self._is_away(to, at - 2.5, until[0] + 0.1):
-                turn = Turn(f"turn{len(self.timeline.turns)}", kind, to, speech, until)
-                turn.is_aborted = kind == "asks" and chance.random() < 0.15
-                if turn.is_aborted and len(self.timeline.people) > 1:  # words after the cut: it depends on what waits
-                    for one in spoken:
-                        if one.who == to and one.known is not None and one.until <= until <= one.known:
-                            one.known = one.until[0], one.until[1] + 1
-                self.timeline.turns.append(turn)
-                if self.timeline.is_worded and not turn.is_aborted:
-                    self._draw_late_words(turn)
-            at = until[0] + chance.choice((self._between(0.2, 2.0), self._between(0.5, 9.0)))
-
-    def _draw_late_words(self, turn: Turn) -> None:
-        """Let words of what is said into the robot's words come when it has been decided that there are none.
-
-        Of several people only where nothing else depends on when these are known: a nod beside them, or words before.
-        """
-        for one in self.timeline.spans:
-            is_within = any(since < one.since and one.until < until for since, until in turn.speech)
-            if one.action == "speak" and one.to == ROBOT and is_within and self._chance.random() < 0.3:
-                beside = [
-                    each for each in self.timeline.spans
-                    if each.who == one.who and each.action != "look"
-                    and one.since[0] - LIMIT < each.until[0] and each.since[0] <= one.until[0]
-                ]  # fmt: skip
-                if len(self.timeline.people) == 1 or beside == [one]:
-                    one.known = self._at(one.until[0] + self._between(0.9, 3.0))
-                    one.words = one.words or self._chance.choice((*LISTENING, *OTHER))

@@ -23,11 +23,15 @@ It is a cough, or a laugh at what a neighbor says.
 """
 
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
+from math import inf
 
 from msgspec import Struct, field
 
-from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.schemas.units import Seconds
+from engage_hri.services.recognition.events.limits import ROUNDING
+from engage_hri.services.recognition.events.listener_sign import SignPart
+from engage_hri.services.text.calling import greeting_before, without_honorific
 
 LONGEST_UNKNOWN: Seconds = 3.0
 """Time after which a sound that still goes on is speech, and it is decided by the looks so far to whom. Ours."""
@@ -50,6 +54,11 @@ WHOEVER: Addressees = frozenset(("",))
 """Of a speech of the robot of which nobody has said to whom it is."""
 
 
+def renamed_in(to: Addressees, other: str, kept: str) -> Addressees:
+    """Addressees with a person's present id in place of another of theirs."""
+    return to - {other} | {kept} if other in to else to
+
+
 class Spoken(Struct, kw_only=True):
     """A speech. to: its addressees; None: they are not known yet. until: None: it goes on."""
 
@@ -59,6 +68,8 @@ class Spoken(Struct, kw_only=True):
     until: Seconds | None = None
     is_noise: bool = False
     """True if no words have come of it."""
+    may_be_noise: bool = False
+    """True as long as words of it would tell that it is no cough."""
     is_open: bool = False
     """True as long as it is not decided what it is that somebody says into the robot's words."""
     is_noted: bool = False
@@ -71,6 +82,10 @@ class Spoken(Struct, kw_only=True):
 
     def is_to(self, actor: str) -> bool:
         return self.to is WHOEVER or (self.to is not None and actor in self.to)
+
+    def overlaps(self, since: Seconds, until: Seconds | None = None) -> bool:
+        """True if the speech and this time have more than an instant in common. until: None: it goes on."""
+        return since < (inf if self.until is None else self.until) and self.since < (inf if until is None else until)
 
 
 class FaceTimes(Struct):
@@ -93,45 +108,62 @@ class FaceTimes(Struct):
         half = (self.at - since) / 2
         return next((face for face, lasted in self.looked.items() if lasted > half), "")
 
+    def most_from(self, face: str, since: Seconds) -> Seconds:
+        """Time from which on this face is the one, if the look stays; infinite: it is not looked at now."""
+        if self.face != face:
+            return inf
+        return 2 * (self.at - self.looked.get(face, 0.0)) - since + ROUNDING
+
 
 class OwnSpeech(Spoken, kw_only=True):
     """A speech of a person, and what tells to whom it is."""
 
-    confidence: Probability
+    part: SignPart
+    """What the conversation is told of it."""
     faces: FaceTimes
+    company: Addressees = NOBODY
+    """Other people who were here."""
     told: Addressees | None = None
     """Addressees by perception."""
     words: str = ""
     is_into_turn: bool = False
     """True if it began while the robot had the floor, as far as is known."""
-    is_interjected: bool = False
-    """True if it has been told of as such."""
+    is_decided: bool = False
+    """True once nothing more of it is waited for."""
+    is_heard: bool = False
+    """True once it has been told to the conversation."""
     is_beside: bool = False
     """True if it began while the robot said something to others."""
-    may_be_noise: bool = False
-    """True as long as words of it would tell that it is no cough."""
 
 
 def named(words: str, names: Mapping[str, str]) -> Addressees:
     """People and robots who are called by the words. names: actor ids by the names by which people call them.
 
-    A name calls somebody if it stands first, last after a comma, or last of a few words: "hello robot". In the
-    middle, and at the end of a sentence, it may be what the sentence is about.
+    A name calls somebody if it stands first, maybe after a greeting, last after a comma, or last of a few words: "hey
+    Ann, look", "hello robot". In the middle, and at the end of a sentence, it may be what the sentence is about.
     """
     said = [word for word in WORDS.findall(words) if any(map(str.isalnum, word))]
     if not said:
         return NOBODY
     lengths = range(1 + max((name.count(" ") for name in names), default=0), 0, -1)
-    calls = [said[:length] for length in lengths if _plain(said[:length]) in names][:1]
-    after = len(calls[0]) if calls else 1
+    after = greeting_before([_plain([word]) for word in said])
+    begun = [(begin, length) for begin in dict.fromkeys((0, after)) for length in lengths]
+    calls = [(begin, begin + length) for begin, length in begun if _called(said[begin : begin + length], names)][:1]
+    after = calls[0][1] if calls else max(1, after)
     calls += [
-        said[-length:]
+        (len(said) - length, len(said))
         for length in lengths
         if after + length <= len(said)
         and (len(said) - length < SHORT_CALL or said[-length - 1].endswith(COMMAS))
-        and _plain(said[-length:]) in names
+        and _called(said[-length:], names)
     ][:1]
-    return frozenset(names[_plain(call)] for call in calls)
+    return frozenset(_called(said[begin:end], names) for begin, end in calls)
+
+
+def _called(words: list[str], names: Mapping[str, str]) -> str:
+    """Actor id of the one of whom these words are the name, maybe with an honorific; "": they are none."""
+    name = _plain(words)
+    return names.get(name) or names.get(without_honorific(name), "")
 
 
 def _plain(words: list[str]) -> str:
@@ -139,18 +171,13 @@ def _plain(words: list[str]) -> str:
     return " ".join(words).strip(MARKS).casefold()
 
 
-def certain(
-    speech: OwnSpeech, company: Collection[str], robot: str, names: Mapping[str, str], *, is_line: bool
-) -> Addressees | None:
-    """Addressees by rules 1 to 3; None if these do not say.
-
-    company: other people who are here. is_line: it was typed, which one does to the robot.
-    """
+def certain(speech: OwnSpeech, robot: str, names: Mapping[str, str], *, is_line: bool) -> Addressees | None:
+    """Addressees by rules 1 to 3; None if these do not say. is_line: it was typed, which one does to the robot."""
     if speech.told is not None:
         return speech.told
     if found := named(speech.words, names):
         return found
-    return None if company and not is_line else frozenset((robot,))
+    return None if speech.company and not is_line else frozenset((robot,))
 
 
 def likely(

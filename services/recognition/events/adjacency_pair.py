@@ -4,6 +4,7 @@ Thesis 2.2.3. The delay runs from the end of the first turn and is negative for 
 that comes while the turn still goes on is known at once, but decided only when the turn has ended.
 """
 
+from collections.abc import Iterable
 from math import inf
 
 from engage_hri.schemas.behaviors import Action
@@ -98,9 +99,9 @@ class AdjacencyPair(Machine):
         return self.state == INTERRUPTED
 
     @property
-    def interrupted_since(self) -> Seconds | None:
-        """Start of the answer to the robot's first turn, which goes on; None: there is none."""
-        return self._response_since if self.state == INTERRUPTED and self._by_robot else None
+    def interrupted_since(self) -> Seconds:
+        """Start of the answer to the robot's first turn, which goes on; infinite: there is none."""
+        return self._response_since if self.state == INTERRUPTED and self._by_robot else inf
 
     @property
     def deadline(self) -> Seconds:
@@ -272,6 +273,11 @@ class AdjacencyPair(Machine):
         else:
             self.event.response, self._response_since, self._response_until = action, at, None
         return True
+
+    def is_answered_in(self, speeches: Iterable[Seconds]) -> None:
+        """Take what is said beside the gesture that answers. speeches: their starts."""
+        if self.event is not None:
+            self.event.spoken += tuple(SpeechStart(self.event.responder, since) for since in speeches)
 
     def answers_late(self, action: Action, at: Seconds, confidence: Probability) -> bool:
         """Take the first accepted action after the limit as the answer of the pair that failed, late.

@@ -94,13 +94,6 @@ class Conversation:
         return self.robot_holds_floor or self.pair.may_be_answered_with("speak")
 
     @property
-    def takes_floor_since(self) -> Seconds:
-        """Start of what the person says now, or has answered into the robot's turn; infinite: of nothing."""
-        if (answered := self.pair.interrupted_since) is not None:
-            return answered
-        return inf if self._speech is None else self._speech.since
-
-    @property
     def is_under_way(self) -> bool:
         """True if one holds the floor, or a pair, a sign or a backchannel is open."""
         is_open = self.exchange.is_open or self.listener.sign is not None or self.robot_backchannel.event is not None
@@ -112,38 +105,32 @@ class Conversation:
 
     # -- the person ---------------------------------------------------------------------------------------------
 
-    def speaks(self, at: Seconds, confidence: Probability = 1.0, *, beside: bool = False) -> None:
+    def speaks(self, speech: SignPart, *, beside: bool = False) -> None:
         """Take the beginning of speech. beside: the robot says something to others."""
         if self._speech is not None:
             return
-        self._speech = self.listener.speaks(at, confidence)
+        self._speech, at = speech, speech.since
         if self.is_into_turn(at) or beside:
             self._writer.interject(self.id, at, "open", at)
             # A line that was typed has no length by which it could be judged: who sends one has something to say.
             if self._scene.lines.get(self.id) != at:
                 self._turned_at = at
-                self.listener.begins(self._speech, beside=not self.robot_holds_floor)
+                self.listener.begins(speech, beside=not self.robot_holds_floor)
                 return
             self._writer.interject(self.id, at, "interruption", at)
         else:
             self._writer.decide_interjection(self.id, at, "answer", at)
             self.listener.next_begins()
         if not self.exchange.is_before_question(at):
-            self.exchange.human_turn("speak", at, confidence)
+            self.exchange.human_turn("speak", at, speech.confidence)
             if self.robot_speaks_since is not None and at < self.robot_speaks_since:
                 self.pair.robot_begins("speak", self.robot_speaks_since)  # what the robot says now is the answer
         self._turned_at = at
 
-    def is_for_others(self, since: Seconds, at: Seconds) -> None:
-        """Forget speech into the robot's turn: it is known now, at `at`, that it is for others."""
-        if self._speech is not None and self._speech.since == since:
-            self._speech = None
-        self.listener.forget(since, at)
-
-    def has_said(self, since: Seconds, until: Seconds, confidence: Probability) -> None:
+    def has_said(self, speech: SignPart) -> None:
         """Take speech that is over, known only now. It says nothing any more if either has spoken since."""
-        if self._is_last(since):
-            self.exchange.human_turn("speak", since, confidence, until)
+        if self._is_last(speech.since):
+            self.exchange.take(speech)
 
     def falls_silent(self, at: Seconds) -> None:
         if self._speech is None:
@@ -174,15 +161,16 @@ class Conversation:
     def manipulates(self, at: Seconds, confidence: Probability = 1.0) -> None:
         self.exchange.human_turn("act", at, confidence)
 
-    def goes_on(self, action: Action, since: Seconds, confidence: Probability) -> None:
+    def goes_on(self, part: SignPart) -> None:
         """Take an action of the person that goes on, known only now. It may be the answer, or more of a turn."""
-        if action == "speak" and self._speech is None:
-            self._speech = self.listener.speaks(since, confidence)
-        self.exchange.goes_on(action, since, confidence)
+        if part.action == "speak" and self._speech is None:
+            self._speech = part
+        self.exchange.goes_on(part.action, part.since, part.confidence)
 
-    def understand(self, since: Seconds, at: Seconds) -> None:
+    def understand(self, speech: SignPart, at: Seconds) -> None:
         """Judge what was said as a sign by its words, whenever they come."""
-        self.listener.understand(since, at, in_turn=self.is_into_turn(since), is_last=self._is_last(since))
+        since = speech.since
+        self.listener.understand(speech, at, in_turn=self.is_into_turn(since), is_last=self._is_last(since))
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         self.exchange.person_gone(at, until)
@@ -287,16 +275,22 @@ class Conversation:
         self.pair.turn_ends(at)
         self._floor_is_free(at)
 
-    def abort(self, at: Seconds, *, turn: str) -> None:
-        """End the pair of a robot's turn that was cut off.
+    def cut_off(self, at: Seconds, *, turn: str) -> None:
+        """Take what goes on for the answer to a robot's turn that is cut off.
 
         Who speaks into the turn at that moment has taken the floor, and so has answered, however long the speech was
         until then. Else the limit of a backchannel and the robot's own limit for giving way would be two judges.
         """
         if self.pair.is_turn(turn):
             self.listener.robots_turn_ends(at, "interruption")
+            if self.pair.is_interrupted:
+                self.pair.turn_ends(at)
+
+    def abort(self, at: Seconds, *, turn: str) -> None:
+        """End the pair of a robot's turn that was cut off, which nobody has answered."""
+        if self.pair.is_turn(turn):
             self.pair.abort(at)
-            self._floor_is_free(at)
+        self._floor_is_free(at)
 
     def withdraw(self, event: OngoingEvent, at: Seconds, *, is_orphan: bool) -> None:
         """Withdraw a pair of the robot; see `Talk.withdraw`."""

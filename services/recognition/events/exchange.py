@@ -15,7 +15,7 @@ begin a first turn while the person still speaks: it answers that person's pair,
 speaker overlap, so this is no mistake, and for a while there are two pairs. Thesis 2.2.3.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.units import Probability, Seconds
@@ -87,11 +87,16 @@ class Exchange:
         if until is not None:
             self.ends(action, until, by_robot=False)
 
-    def take(self, part: SignPart) -> None:
-        """Take a part of a sign that turns out to be a turn: speech may be any, a gesture only an answer."""
+    def take(self, part: SignPart, beside: Sequence[Seconds] = ()) -> None:
+        """Take a part of a sign that turns out to be a turn: speech may be any, a gesture only an answer.
+
+        beside: starts of what is said with a gesture: its words are those of the answer.
+        """
         if part.action != "speak":
-            if self.pair.human_begins(part.action, part.since, part.confidence) and part.until is not None:
-                self.pair.ends(part.action, part.until, by_robot=False)
+            if self.pair.human_begins(part.action, part.since, part.confidence):
+                self.pair.is_answered_in(beside)
+                if part.until is not None:
+                    self.pair.ends(part.action, part.until, by_robot=False)
         elif not self.is_before_question(part.since) and part.since >= self.pair.interrupted_until:
             self.human_turn("speak", part.since, part.confidence, part.until)
 

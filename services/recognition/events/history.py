@@ -32,20 +32,17 @@ class ActionHistory:
     """Times at which the actions of one actor last began and ended, for the `kept` latest of them."""
 
     def __init__(self, kept: int) -> None:
-        self._kept = kept
-        self._performed: dict[tuple[Action, str, tuple[str, ...]], tuple[Seconds, Seconds]] = {}
-        """The one that was reported last comes last."""
+        self._performed: Latest[tuple[Action, str, tuple[str, ...]], tuple[Seconds, Seconds]] = Latest(kept)
 
     def is_new(self, action: ActionBegan | ActionEnded, at: Seconds) -> bool:
         """True unless the report repeats an earlier one, or comes after a newer report of the same action."""
-        performed, key = self._performed, (action.action, action.behavior, action.targets)
-        before = began, ended = performed.pop(key, NEVER_PERFORMED)
-        if len(performed) == self._kept:
-            del performed[next(iter(performed))]
+        key = (action.action, action.behavior, action.targets)
+        began, ended = self._performed.get(key, NEVER_PERFORMED)
         if isinstance(action, ActionBegan):
             is_new = at > began and at >= ended
-            performed[key] = (at, ended) if is_new else before
+            began = at if is_new else began
         else:
             is_new = at > ended and at >= began
-            performed[key] = (began, at) if is_new else before
+            ended = at if is_new else ended
+        self._performed[key] = began, ended
         return is_new

@@ -46,7 +46,9 @@ class InterruptedLooks:
     def feed(self, report: Symbolic, at: Seconds) -> list[Timed]:
         """Take a report of perception. Returns the reports that hold now, each with its time."""
         match report:
-            case ActionEnded(action="look", actor=actor):
+            case ActionEnded(action="look", actor=actor, targets=targets):
+                if actor in self._breaks and self._breaks[actor].ended.targets == targets:
+                    return []  # it comes twice, and makes nothing certain
                 before = self._end(actor)
                 self._breaks[actor] = _Break(report, at, actor in self._lost)
                 return before

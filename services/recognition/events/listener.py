@@ -17,23 +17,20 @@ says nothing any more: an old "stop" would answer what was asked after it. Of wh
 the robot speaks to others, nothing is in a turn of theirs.
 """
 
+from collections.abc import Sequence
 from math import inf
 
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.recognition import InterjectionReading
-from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.addressing import WORDS_AFTER
 from engage_hri.services.recognition.events.backchannel import Backchannel
 from engage_hri.services.recognition.events.exchange import Exchange
-from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.listener_sign import WORDS_WAIT, ListenerSign, SignPart
 from engage_hri.services.recognition.events.machine import EventWriter, OngoingEvent, SpeechStart
 from engage_hri.services.recognition.events.scene import SessionScene
 from engage_hri.services.text.listening import is_listening, says_words
-
-SPEECHES_KEPT = 8
-"""Number of speeches of which words may still tell that they were something else."""
 
 
 class Listener:
@@ -50,15 +47,8 @@ class Listener:
         self._backchannel = Backchannel(writer, limit=config.backchannel_limit)
         self.sign: ListenerSign | None = None
         """What the person does in the robot's turn, as long as it is not decided what it is."""
-        self._speeches: Latest[Seconds, SignPart] = Latest(SPEECHES_KEPT)
-        """The person's latest speeches, by their starts."""
 
     # -- a sign -------------------------------------------------------------------------------------------------
-
-    def speaks(self, since: Seconds, confidence: Probability) -> SignPart:
-        """Note a speech, as a sign or not."""
-        speech = self._speeches[since] = SignPart("speak", since, confidence)
-        return speech
 
     def begins(self, part: SignPart, *, beside: bool = False) -> None:
         """Take a part of the sign that goes on, or of a new one. beside: the robot speaks to others."""
@@ -80,6 +70,10 @@ class Listener:
         if part.action == "speak":
             self._scene.read(self._id, part.since, "open")
 
+    def listens_to(self, part: SignPart) -> bool:
+        """True if this is part of the sign."""
+        return self.sign is not None and any(each is part for each in self.sign.parts)
+
     @property
     def is_beside(self) -> bool:
         """True while a sign is open that has begun beside the robot's words to others."""
@@ -100,15 +94,6 @@ class Listener:
                 part.until = at
             self.judge(at)
 
-    def forget(self, since: Seconds, at: Seconds) -> None:
-        """Forget a speech of the sign, as that was for others."""
-        self._speeches.pop(since, None)
-        if self.sign is not None:
-            self.sign.parts = [part for part in self.sign.parts if part.action != "speak" or part.since != since]
-            self.sign = self.sign if self.sign.parts else None
-            self._scene.read(self._id, since, "other")
-            self.judge(at)
-
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         sign, self.sign = self.sign, None
         if sign is not None and not sign.speeches:
@@ -124,11 +109,14 @@ class Listener:
         sign = self.sign
         if sign is None or (sign.speeches and self._asks_for_nothing(sign.speeches[-1])):
             return inf
-        if not self._scene.is_worded:
-            return sign.deadline(self._config.backchannel_limit)
-        if sign.is_beside:
+        if sign.is_beside and self._scene.is_worded:
             return sign.deadline(self._scene.longest_unknown, WORDS_AFTER)
-        return sign.deadline(WORDS_WAIT)
+        return sign.deadline(self.longest)
+
+    @property
+    def longest(self) -> Seconds:
+        """Time after which a voice that goes on in the robot's turn is no listener's, if it has no words."""
+        return WORDS_WAIT if self._scene.is_worded else self._config.backchannel_limit
 
     def pass_time(self, at: Seconds) -> None:
         """Decide the sign: its speech has become too long for a backchannel, or its words have not come."""
@@ -164,15 +152,12 @@ class Listener:
                 self._takes_floor(part, at, reading)
                 return
 
-    def understand(self, since: Seconds, at: Seconds, *, in_turn: bool, is_last: bool) -> None:
+    def understand(self, speech: SignPart, at: Seconds, *, in_turn: bool, is_last: bool) -> None:
         """Judge a speech by its words.
 
         in_turn: the robot's turn goes on in which it was said. is_last: neither has begun to say anything since.
         """
-        speech = self._speeches.get(since)
-        if speech is None:
-            return
-        if self.sign is not None and any(part is speech for part in self.sign.parts):
+        if self.listens_to(speech):
             if self._is_echo(speech):
                 self._tell(speech, at)  # the robot need not wait until it is over
             self.judge(at)
@@ -181,7 +166,9 @@ class Listener:
         is_new = speech.taken_for == "noise" and (in_turn or is_last)
         if listens is False and (is_new or (in_turn and speech.taken_for == "backchannel")):
             self._is_turn(speech, "interruption" if in_turn else "answer", at)
-        elif listens and (is_new or self._exchange.pair.was_listening(since)):
+        elif listens and speech.taken_for == "backchannel" and in_turn:
+            self._tell(speech, at)  # it is that of the nod beside it, which has been told
+        elif listens and (is_new or self._exchange.pair.was_listening(speech.since)):
             if speech.until is None:
                 self._joins(speech)
             else:
@@ -213,19 +200,24 @@ class Listener:
 
     def _takes_floor(self, part: SignPart, at: Seconds, reading: InterjectionReading) -> None:
         """Take a part of the sign as a turn of the person since it began. Speech before it was a listener's."""
+        beside: list[Seconds] = []
         for speech in self.sign.speeches if self.sign is not None else ():
             if speech.since < part.since:
                 self._tell(speech, at)
             elif speech is not part:  # it goes on beside the gesture that answers, and is of that answer
                 self._read(speech.since, reading, at)
+                beside.append(speech.since)
         self.sign = None
-        self._is_turn(part, reading, at)
+        self._is_turn(part, reading, at, beside)
 
-    def _is_turn(self, part: SignPart, reading: InterjectionReading, at: Seconds) -> None:
+    def _is_turn(
+        self, part: SignPart, reading: InterjectionReading, at: Seconds, beside: Sequence[Seconds] = ()
+    ) -> None:
+        """Take a part as a turn. beside: starts of what is said with it."""
         if part.action == "speak":
             self._read(part.since, reading, at)
         part.taken_for = "turn"
-        self._exchange.take(part)
+        self._exchange.take(part, beside)
 
     def _tell(self, speech: SignPart, at: Seconds) -> None:
         """Tell that a speech was a listener's, or noise where its words would have come."""

@@ -5,7 +5,7 @@ Guards are part of the input's name (`robot_directs_shared`), so that table and 
 """
 
 from collections.abc import Mapping
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -130,6 +130,8 @@ class EventWriter:
 
     def __init__(self, clock: str, session: str = "", *, words_patience: Seconds = 0.0) -> None:
         self.effects: list[Effect] = []
+        self.now: Seconds = 0.0
+        """Time of what is being taken. What is told may have happened before."""
         self._clock = clock
         self._session = session
         self._count: dict[EventKind, int] = dict.fromkeys(EVENT_KINDS, 0)
@@ -204,21 +206,23 @@ class EventWriter:
         before = self._interjected.get(SpeechStart(person, speech))
         if before is not None and (reading == "open" or (before.reading, before.words) == (reading, words)):
             return
-        told = Interjection(actor=person, since=stamp(speech), at=stamp(at), reading=reading, words=words)
+        told = Interjection(
+            actor=person, since=stamp(speech), at=stamp(max(at, self.now)), reading=reading, words=words
+        )
         self._interjected[SpeechStart(person, speech)] = told
         self.effects.append(told)
 
     def decide_interjection(self, person: str, speech: Seconds, reading: InterjectionReading, at: Seconds) -> None:
-        """Tell what it is that somebody says into the robot's turn, if only that it began has been told."""
+        """Tell what it is that somebody says into the robot's turn, if that it began has been told, and no more."""
         told = self._interjected.get(SpeechStart(person, speech))
-        if told is not None and told.reading == "open":
+        if told is not None and told.reading in ("open", "noise"):
             self.interject(person, speech, reading, at)
 
     def interject_again(self, person: str, speech: Seconds, at: Seconds) -> None:
         """Tell once more what somebody has said into the robot's turn if its words are others by now."""
         told, words = self._interjected.get(SpeechStart(person, speech)), self.text_of(person, speech)
         if told is not None and words != told.words:
-            self.interject(person, speech, told.reading, max(at, told.at.seconds))
+            self.interject(person, speech, told.reading, at)
 
     def understand(self, person: str, speech: Seconds, text: str, at: Seconds) -> None:
         """Take the words of a speech, known at `at`. Events that consist of it are told again if they have others."""
@@ -258,6 +262,20 @@ class EventWriter:
         """End the open events with `person` as lost."""
         for event in [event for event in self._open.values() if person in (event.initiator, event.responder)]:
             self.publish(event, "lost", at)
+
+    def join(self, other: str, kept: str) -> None:
+        """Take what a person has said by another id as theirs."""
+
+        def named(speech: SpeechStart) -> SpeechStart:
+            return SpeechStart(kept, speech.since) if speech.actor == other else speech
+
+        for remembered in (self._texts, self._interjected):
+            for speech in [each for each in remembered if each.actor == other]:
+                told: Any = remembered.pop(speech)
+                if named(speech) not in remembered:
+                    remembered[named(speech)] = told
+        for event, _ in self._spoken.values():
+            event.spoken = tuple(map(named, event.spoken))
 
     def answer(self, request: str, event: str, at: Seconds) -> None:
         """Answer a request with an event that has been published already."""

@@ -12,6 +12,7 @@ from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import FORGOTTEN_AFTER, Deadlines
 from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.events.limits import ROUNDING
 from engage_hri.services.recognition.events.machine import EventWriter, Mishap, OngoingEvent, PersonForgotten
 from engage_hri.services.recognition.events.person import PersonRecognition
 from engage_hri.services.recognition.events.scene import SessionScene, TakenUp
@@ -99,21 +100,26 @@ class People:
         self._writer.effects.append(PersonForgotten(id))
         self._follow(now)
 
-    def join(self, other: str, kept: str, at: Seconds) -> None:
-        """Take two persons for one, who is `kept` from now on. What is open with the other is lost."""
+    def join(self, other: str, kept: str, at: Seconds, *, speaks: bool) -> None:
+        """Take two persons for one, who is `kept` from now on.
+
+        What is open with the other is lost, but for what they have said and is not decided. speaks: they go on.
+        """
         before = self.persons.get(other)
         if before is None:
             return
+        self._scene.join(other, kept)
+        self._writer.join(other, kept)
         self.lose_track(before, at)
         is_found = before.presence.here and before.presence.reported
         self._drop(other, at, at)
         self._contacts.pop(kept, None)  # what was told of the other may be taken for it
-        self._scene.join(other, kept)
         gazes = [self._scene.gaze, *(person.gaze for person in self.persons.values())]
         for gaze in gazes:
             gaze.targets = tuple(kept if target == other else target for target in gaze.targets)
         if is_found:
             self.observe(kept, at, lambda person: person.presence.found(at))
+        self.observe(kept, at, lambda person: person.talk.take_over(before.talk, at, goes_on=speaks))
 
     def lose_track(self, person: PersonRecognition, at: Seconds) -> None:
         """Begin anew with a person: its open events end as lost, and its actions have to be observed again."""
@@ -199,6 +205,10 @@ class People:
         while answered := self._writer.answered:
             # The end of a turn decides several answers in one instant: the first is that of who was silent.
             first = min(range(len(answered)), key=lambda n: answered[n][0].delay or 0.0)
+            event, at_end = answered[first]
+            since = at_end + min(0.0, event.delay or 0.0) - ROUNDING
+            if any(person.talk.has_answered_since < since for person in self.persons.values()):
+                return  # somebody who began before has answered, too, or may have
             told = partial(_answered_for_all, *answered.pop(first))
             for person in list(self.persons.values()):  # who has left meanwhile was asked, too
                 self._apply(person, at, told)

@@ -2,7 +2,7 @@
 
 from collections import deque
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from msgspec import Struct
 
@@ -12,7 +12,13 @@ from engage_hri.schemas.recognition import InterjectionReading
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import GazeResolution
-from engage_hri.services.recognition.events.addressing import LONGEST_UNKNOWN, LONGEST_UNTOLD, Addressees, Spoken
+from engage_hri.services.recognition.events.addressing import (
+    LONGEST_UNKNOWN,
+    LONGEST_UNTOLD,
+    Addressees,
+    Spoken,
+    renamed_in,
+)
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, in_time
 
@@ -130,6 +136,8 @@ class SessionScene:
         self.gaze = GazeState()
         self.robot_spoken: Spoken | None = None
         """What the robot says now."""
+        self.turn: tuple[str, Addressees] | None = None
+        """The robot's turn that has not ended, and to whom it is."""
         self.head_owner = Claim(kind="none", priority=0)
         self.people_in_world: frozenset[str] = frozenset()
         self.covered = Covered(frozenset())
@@ -225,9 +233,17 @@ class SessionScene:
         self.names = {name: id for name, id in self.names.items() if id != person}
 
     def join(self, other: str, kept: str) -> None:
-        """Take a person who is in the world for `kept`."""
+        """Take two persons for one, who is `kept` from now on."""
         if other in self.people_in_world:
             self.people_in_world = self.people_in_world - {other} | {kept}
+        for remembered in (self.echoes, self.told_addressees):
+            for person, since in [each for each in remembered if each[0] == other]:
+                told: Any = remembered.pop((person, since))
+                remembered[kept, since] = told
+        for spoken in self.spoken:
+            spoken.actor = kept if spoken.actor == other else spoken.actor
+            spoken.to = renamed_in(spoken.named, other, kept) or spoken.to
+        self.floor_changes += 1
 
     @property
     def longest_unknown(self) -> Seconds:
@@ -249,15 +265,23 @@ class SessionScene:
         """The speech that began then; None: it is not known to whom it was, or long ago."""
         return next((each for each in self.spoken if each.actor == actor and each.since == since), None)
 
+    def forget_spoken(self, spoken: Spoken) -> None:
+        """Forget a speech that was another one's: two have told of it."""
+        self.floor_changes += 1
+        self.spoken = deque((each for each in self.spoken if each is not spoken), SPOKEN_KEPT)
+
     def read(self, actor: str, since: Seconds, reading: InterjectionReading) -> None:
         """Take what a speech into the robot's words is."""
         if (spoken := self.spoken_since(actor, since)) is not None:
             spoken.is_open, spoken.is_noise = reading == "open", reading == "noise"
+            spoken.may_be_noise &= spoken.is_open
             self.floor_changes += 1
 
     def ended(self) -> list[Spoken]:
         """The speeches that were over last, in the order of their ends: of those known to be some, and to whom."""
-        known = [each for each in self.spoken if each.named and not (each.is_open or each.is_noise)]
+        known = [
+            each for each in self.spoken if each.named and not (each.is_open or each.may_be_noise or each.is_noise)
+        ]
         over = [(each.until, each.since, each) for each in known if each.until is not None]
         return [each for _, _, each in sorted(over, key=lambda one: one[:2])[-ENDED_TOLD:]]
 

@@ -23,7 +23,7 @@ from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.addressing import WHOEVER, WORDS_AFTER, Addressees, Spoken
+from engage_hri.services.recognition.events.addressing import WHOEVER, WORDS_AFTER, Addressees, Spoken, renamed_in
 from engage_hri.services.recognition.events.exchange import TURN_PATIENCE
 from engage_hri.services.recognition.events.history import ActionHistory, Latest
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock, anchor
@@ -85,8 +85,6 @@ class Session:
         """The robot's actions."""
         self._addressed: Latest[str, Addressees] = Latest(BLOCKS_KEPT)
         """To whom the robot speaks in each block."""
-        self._turn: tuple[str, Addressees] | None = None
-        """The robot's turn that has not ended, and to whom it is."""
         self._takes: dict[type, Callable[[Any, Seconds], object]] = {
             ActionBegan: self._begins, ActionEnded: self._ends, GoesOn: self._goes_on,
             ActorFound: self._found, ActorLost: self._lost, World: self._people.see, Covered: self._hands_changed,
@@ -141,6 +139,7 @@ class Session:
 
     def _take_step(self) -> None:
         """Take the step that is due first: a person's, or the end of the robot's look."""
+        self._writer.now = max(self._writer.now, self._agenda.look)
         if self._agenda.first != self.robot:
             self._people.advance()
         else:
@@ -154,6 +153,7 @@ class Session:
         while self._agenda.look < at - ROUNDING:
             self._take_step()
         self._people.forget(at)
+        self._writer.now = at
         self._takes[type(observation)](observation, at)
         return self._take()
 
@@ -161,7 +161,7 @@ class Session:
         if began.actor == self.robot:
             self._robot_begins(began, at)
         else:
-            by_look = began.action == "look"
+            by_look = began.action == "look" and began.actor not in self.scene.unknown
             self._people.observe(began.actor, at, lambda person: person.begins(began, at), by_look=by_look)
 
     def _ends(self, ended: ActionEnded, at: Seconds) -> None:
@@ -223,9 +223,16 @@ class Session:
             self._lose_untold(person, at)
         return self._take()
 
-    def join(self, other: str, kept: str, at: Seconds) -> list[Effect]:
-        """Take two persons for one, who is `kept` from now on. What is open with the other is lost."""
-        self._people.join(other, kept, at)
+    def join(self, other: str, kept: str, at: Seconds, *, speaks: bool = False) -> list[Effect]:
+        """Take two persons for one, who is `kept` from now on. speaks: what the other says goes on.
+
+        What is open with the other is lost, but for what they have said and is not decided.
+        """
+        for block, to in tuple(self._addressed.items()):
+            self._addressed[block] = renamed_in(to, other, kept)
+        if self.scene.turn is not None:
+            self.scene.turn = self.scene.turn[0], renamed_in(self.scene.turn[1], other, kept)
+        self._people.join(other, kept, at, speaks=speaks)
         self._lose_untold(other, at)
         return self._take()
 
@@ -290,7 +297,7 @@ class Session:
         block = behavior.rpartition(":")[0]
         if block in self._addressed:
             return self._addressed[block]
-        return None if self._turn is None else self._turn[1]
+        return None if self.scene.turn is None else self.scene.turn[1]
 
     def announce(self, observation: Observation) -> None:
         """Learn to whom a block of the robot is. It may be called before the observation itself is fed."""
@@ -353,7 +360,6 @@ class Session:
             self._people.apply(
                 words.actor, at, lambda person: person.talk.understand(words.since, words.text, words.to, at)
             )
-        self._writer.interject_again(words.actor, words.since, at)
 
     def _robot_is_heard(self, state: RobotState, at: Seconds) -> None:
         """End speech with a lost end: the body showed that it speaks, and for `SILENCE` no longer does."""
@@ -496,12 +502,12 @@ class Session:
     def _opens(self, turn: str, addressee: str) -> None:
         """Note a turn of the robot that goes on over several blocks."""
         if turn and addressee:
-            before = self._turn[1] if self._turn is not None and self._turn[0] == turn else frozenset()
-            self._turn = (turn, before | {addressee})
+            before = self.scene.turn[1] if self.scene.turn is not None and self.scene.turn[0] == turn else frozenset()
+            self.scene.turn = (turn, before | {addressee})
 
     def _closes(self, turn: str) -> None:
-        if self._turn is not None and self._turn[0] == turn:
-            self._turn = None
+        if self.scene.turn is not None and self.scene.turn[0] == turn:
+            self.scene.turn = None
 
     def _cancel(self, cancel: Cancel, at: Seconds) -> None:
         event, _ = self._live.pop(cancel.id, (None, None))
@@ -537,10 +543,9 @@ class Session:
         self._writer.effects.append(TurnOutcome(id=request.id, at=self._writer.stamp(at)))
 
     def _abort(self, actor: str, at: Seconds, turn: str) -> None:
-        """End the pairs of a turn that was cut off; first that of who has cut in, which may answer for all."""
-        here = [person for person in self.persons.values() if person.presence.here and actor in ("", person.id)]
-        for person in sorted(here, key=lambda each: each.talk.takes_floor_since):
-            self._people.apply(person.id, at, lambda person: person.abort(at, turn=turn))
+        """End the pairs of a turn that was cut off; first of those who have cut in, who may answer for all."""
+        self._tell(actor, at, lambda talk: talk.cut_off(at, turn=turn))
+        self._apply_to_addressees(actor, at, lambda person: person.abort(at, turn=turn))
 
     def _apply_to_addressees(self, actor: str, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
         """Apply a step to a known person, or to all (actor: empty)."""

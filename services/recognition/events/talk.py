@@ -5,12 +5,19 @@ where recognizers tell words, these tell whether a sound is speech at all: a cou
 the robot says or asks meanwhile may be the answer to it. So from such a speech on everything waits in line, and is
 told in the order in which it happened, with its own times: what is known late has happened early.
 
-A sound into the robot's own words is decided by the conversation, which knows what else it may be (`listener_sign`).
+Into the robot's words it is no other, only that the robot waits: it falls silent for what may be for it (`open`), so
+that nothing is waited for longer than it has to be. To whom a sign of a listener is, and its words, are known here;
+what it is says the conversation, which knows what else it may be (`listener_sign`).
+
+The person's latest speeches are remembered. Of what nothing has been told, words that come late may say anything: to
+whom it was, and that it was no noise. Of the rest they correct what the conversation has taken it for (`listener`).
 """
 
 from collections import deque
 from collections.abc import Callable
-from math import inf
+from itertools import islice
+from math import inf, nextafter
+from typing import NamedTuple
 
 from engage_hri.schemas.behaviors import EVENT_KINDS, Action, Event
 from engage_hri.schemas.perception import ActionBegan
@@ -29,13 +36,20 @@ from engage_hri.services.recognition.events.conversation import Conversation
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.kinds import KindRecognizer
 from engage_hri.services.recognition.events.limits import ROUNDING, LimitClock
+from engage_hri.services.recognition.events.listener_sign import WORDS_WAIT, SignPart
 from engage_hri.services.recognition.events.machine import EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import Question, SessionScene
-from engage_hri.services.text.listening import says_words
+from engage_hri.services.text.listening import is_listening, says_words
 
-WORDLESS_KEPT = 8
-"""Number of sounds of which words may still tell that they were speech, or for whom."""
+SPEECHES_KEPT = 8
+"""Number of speeches of each person of which words may still tell what they were, and for whom."""
 Step = Callable[[Conversation], object]
+
+
+class CutOff(NamedTuple):
+    """The robot's turn was cut off: its pair ends, unless somebody has answered it before."""
+
+    step: Step
 
 
 class Talk(KindRecognizer):
@@ -44,24 +58,19 @@ class Talk(KindRecognizer):
     def __init__(self, id: str, scene: SessionScene, config: RecognitionConfig, writer: EventWriter) -> None:
         super().__init__(id, scene, config, writer)
         self._conversation = Conversation(id, scene, config, writer)
-        self._line: deque[tuple[Seconds, Step | OwnSpeech]] = deque()
+        self._line: deque[tuple[Seconds, Step | OwnSpeech | CutOff]] = deque()
         """What is not told yet, with its times. The first is a speech of which it is not known to whom it is."""
         self._asked_in_line: Seconds = inf
         """Start of the first turn of the robot that is in line; infinite: none is."""
         self.speech: OwnSpeech | None = None
         """The speech of the person that goes on."""
-        self._wordless: Latest[Seconds, OwnSpeech] = Latest(WORDLESS_KEPT)
-        """The latest sounds that were decided without words, and told to nobody, by their starts."""
+        self._speeches: Latest[Seconds, OwnSpeech] = Latest(SPEECHES_KEPT)
+        """The person's latest speeches, by their starts."""
 
     @property
     def is_in_contact(self) -> bool:
         """True while the person says something that is known to be for the robot."""
         return self.speech is not None and self.speech.is_to(self._scene.robot)
-
-    @property
-    def takes_floor_since(self) -> Seconds:
-        """Start of what the person says to the robot now, or has answered into its turn; infinite: of nothing."""
-        return self._conversation.takes_floor_since
 
     @property
     def question(self) -> Question | None:
@@ -80,6 +89,13 @@ class Talk(KindRecognizer):
         """Time since when the robot asks the person, or waits for the answer, as far as is known; else infinite."""
         pair = self._conversation.exchange.pair
         return pair.event.started if pair.event is not None and pair.may_be_answered else self._asked_in_line
+
+    @property
+    def has_answered_since(self) -> Seconds:
+        """Start of what answers the robot's turn, or may; infinite: nothing does."""
+        pair, sign = self._conversation.pair, self._conversation.listener.sign
+        since = [each.since for each in sign.speeches] if sign is not None else []
+        return min([*since, pair.interrupted_since, *(at for at, _ in islice(self._line, 1))])
 
     @property
     def is_under_way(self) -> bool:
@@ -103,11 +119,22 @@ class Talk(KindRecognizer):
 
     def _decided_at(self, speech: OwnSpeech) -> Seconds:
         """Time at which the first speech in line is decided."""
-        if speech.until is None:
-            return speech.since + self._scene.longest_unknown
-        may_call = self._scene.is_worded and not speech.faces.most(speech.since)
-        is_open = self._may_be_noise(speech) or may_call or self._scene.tells_addressees
-        return speech.until + (WORDS_AFTER if is_open else 0.0)
+        scene, listener, since, until = self._scene, self._conversation.listener, speech.since, speech.until
+        is_known = says_words(speech.words) or (self.id, since) in scene.echoes
+        is_sign = self._conversation.is_into_turn(since)  # it holds the robot, which waits for no more than it has to
+        if until is None:
+            at_last = since + scene.longest_unknown
+            if not is_sign:
+                return at_last
+            early = since if is_known and not is_listening(speech.words) else since + listener.longest
+            is_for_robot = since if speech.is_to(scene.robot) else speech.faces.most_from(scene.robot, since)
+            return min(at_last, max(early, is_for_robot))
+        if is_known or not (scene.is_worded or scene.tells_addressees):
+            return until
+        is_seen = speech.faces.most(since) == scene.robot and not scene.tells_addressees
+        is_seen = is_sign and (is_seen or speech.is_to(scene.robot))
+        over = until + (0.0 if is_seen else WORDS_AFTER)
+        return max(over, since + WORDS_WAIT) if is_sign or speech.is_beside else over
 
     # -- the person ---------------------------------------------------------------------------------------------
 
@@ -117,6 +144,7 @@ class Talk(KindRecognizer):
             if speech.until is None:
                 speech.faces.turns(face, at)
                 self._may_interrupt(speech, face, at)
+        self.go_on(at)
 
     def begins(self, began: ActionBegan, at: Seconds, face: str) -> None:
         action, confidence = began.action, began.confidence
@@ -136,29 +164,35 @@ class Talk(KindRecognizer):
 
     def _speaks(self, at: Seconds, confidence: Probability, face: str) -> None:
         """Take the beginning of a speech. face: whose face the person looks at."""
-        self.speech = speech = self._own_speech(at, confidence, face)
+        speech = self._own_speech(at, confidence, face)
         speech.told, speech.words = self._scene.told_to(self.id, at), self._writer.text_of(self.id, at)
         # What waits in line may be the robot's own turn, so that only the scene knows that it has begun.
         said = self._scene.robot_spoken
         is_into_words = said is not None and said.since <= at
         is_to_person = said is not None and said.is_to(self.id)
         speech.is_beside = is_into_words and not is_to_person
-        is_into_turn = is_into_words and is_to_person if self._line else self._conversation.is_into_turn(at)
+        is_in_pause = self.asked_since < inf and self._scene.turn is not None and self.id in self._scene.turn[1]
+        may_be_in_turn = (is_into_words and is_to_person) or is_in_pause
+        is_into_turn = may_be_in_turn if self._line else self._conversation.is_into_turn(at)
         is_line = self._scene.lines.get(self.id) == at
         speech.may_be_noise = self._scene.is_worded and not (is_line or says_words(speech.words))
         speech.is_into_turn = is_into_turn
-        self._find(speech, face if is_into_turn else "", at)
+        speech.is_open = is_into_turn or speech.is_beside
+        self._find(speech, at)
         self._may_interrupt(speech, face, at)
         if not self._line:
             self._conversation.listener.next_begins()
         self._queue(at, speech)
 
     def _may_interrupt(self, speech: OwnSpeech, face: str, at: Seconds) -> None:
-        """Tell of a speech into the robot's turn, unless it is for somebody else, or looks like that."""
+        """Tell of a speech into the robot's turn, unless it is for somebody else, or looks like that.
+
+        Of one into its words to others that is told when it is known to be for the robot.
+        """
         is_aside = face not in ("", self._scene.robot) if speech.to is None else not speech.is_to(self._scene.robot)
-        if speech.is_into_turn and not speech.is_interjected and not is_aside:
+        is_for_robot = speech.is_beside and speech.is_to(self._scene.robot)
+        if (speech.is_into_turn or is_for_robot) and not is_aside:
             self._writer.interject(self.id, speech.since, "open", at)
-            speech.is_interjected = True
 
     def _falls_silent(self, at: Seconds) -> None:
         """Take the end of the speech that goes on."""
@@ -182,74 +216,125 @@ class Talk(KindRecognizer):
 
     def goes_on(self, action: Action, since: Seconds, at: Seconds, confidence: Probability, face: str) -> None:
         """Take an action that goes on, known only now, at `at`. It has been decided by the looks of now to whom."""
-        if action == "speak":
-            self.speech = speech = self._own_speech(since, confidence, face)
-            if not self._find(speech, face, at):
+        part = SignPart(action, since, confidence)
+        if action == "speak" and any(each.overlaps(since) for each in self._speeches.values()):
+            known = self.speech  # it has been told by another id of the person
+            if known is None or not known.is_heard:
+                return
+            part = known.part
+        elif action == "speak":
+            speech = self._own_speech(since, confidence, face)
+            if not self._find(speech, at):
                 self._address(speech, self._likely(speech, at), at)
             if not speech.is_to(self._scene.robot):
                 return
-        self.take(at, lambda talk: talk.goes_on(action, since, confidence))
+            speech.is_heard, part = True, speech.part
+        self.take(at, lambda talk: talk.goes_on(part))
 
     def understand(self, since: Seconds, words: str, told: Addressees | None, at: Seconds) -> None:
         """Take the words of a speech. told: addressees, if perception knows them."""
-        for speech in self._undecided:
-            if speech.since == since:
-                speech.words, speech.told = words or speech.words, told or speech.told
-                speech.may_be_noise &= not says_words(speech.words)
-                if speech.to is None:
-                    self._find(speech, "", at)
-        if (known := self._wordless.get(since)) is not None and (says_words(words) or told):
-            self._has_words(known, words, told, at)
-        self.take(at, lambda talk: self._open_is_for(talk, since, words, told, at))
-        self.take(at, lambda talk: talk.understand(since, at))
+        speech = self._speeches.get(since)
+        if speech is None:
+            self._writer.interject_again(self.id, since, at)
+            return
+        speech.words, speech.told = words or speech.words, told or speech.told
+        self._is_known_speech(speech, is_known=says_words(speech.words))
+        if not speech.is_heard or speech.is_noise:
+            self._has_news(speech, at)
+        self.take(at, lambda talk: self._judge(talk, speech, at))
         self.go_on(at)
 
-    def _open_is_for(
-        self, talk: Conversation, since: Seconds, words: str, told: Addressees | None, at: Seconds
-    ) -> None:
-        """Take for whom a speech is that the face alone has told to be for the robot, as long as it is a sign."""
-        speech = self._scene.spoken_since(self.id, since)
-        if isinstance(speech, OwnSpeech) and speech.is_open:
-            speech.words, speech.told = words or speech.words, told or speech.told
-            if self._find(speech, "", at) and not speech.is_to(self._scene.robot):
-                talk.is_for_others(since, at)
+    def _judge(self, talk: Conversation, speech: OwnSpeech, at: Seconds) -> None:
+        """Take the words of a speech in their turn; if they decide nothing they are told all the same."""
+        talk.understand(speech.part, at)
+        self._writer.interject_again(self.id, speech.since, at)
 
-    def _has_words(self, speech: OwnSpeech, words: str, told: Addressees | None, at: Seconds) -> None:
-        """Take words that come late: the sound was speech after all, or is for others than it seemed."""
-        speech.words, speech.told = words or speech.words, told or speech.told
-        if speech.is_noise and not says_words(speech.words):
+    def _is_known_speech(self, speech: OwnSpeech, *, is_known: bool = True) -> None:
+        """Note that a sound is no noise, or that nothing else may be known of it."""
+        if is_known and speech.may_be_noise:
+            speech.may_be_noise = False
+            self._scene.floor_changes += 1
+
+    def _has_news(self, speech: OwnSpeech, at: Seconds) -> None:
+        """Take news of a speech of which nothing is told yet: it may be for others than it seemed, and no noise."""
+        is_noise, robot = speech.is_noise, self._scene.robot
+        if is_noise and not says_words(speech.words):
             return
-        if not self._find(speech, "", at) and speech.is_noise:
+        if not self._find(speech, at) and is_noise and not speech.is_heard:
             self._address(speech, self._likely(speech, at), at)
-        speech.is_noise = False
-        if not speech.is_to(self._scene.robot):
-            return  # more of the words may still call it
-        del self._wordless[speech.since]
-        since, until, confidence = speech.since, speech.until, speech.confidence
-        if any(each is speech for _, each in self._line):
-            return
-        if until is None:
-            self.take_early(since, lambda talk: talk.speaks(since, confidence, beside=speech.is_beside))
-        else:
-            self.take_early(since, lambda talk: talk.has_said(since, until, confidence))
+        if not speech.is_to(robot):
+            speech.is_noise = speech.is_heard = False  # more of the words may still call it
+            speech.part.taken_for = ""
+        elif not speech.is_heard and not any(each is speech for _, each in self._line):
+            speech.is_noise, speech.is_heard = False, True
+            speech.part.until = speech.until
+            if speech.until is None:
+                self.take_early(speech.since, lambda talk: talk.speaks(speech.part, beside=speech.is_beside))
+            elif speech.is_into_turn or speech.is_beside:
+                speech.part.taken_for = "noise"  # as such it is judged by its words
+            else:
+                self.take_early(speech.since, lambda talk: talk.has_said(speech.part))
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         """Take the person's leaving: nothing waits any longer."""
         if self.speech is not None and self.speech.until is None:
             self.speech.until = until
         self.speech = None
-        self._wordless.clear()
         for speech in self._undecided:
             self._decide(speech, at)
         self.go_on(at)
-        self._take_in_order(at, lambda talk: talk.person_gone(at, until))
+        self._take_in_order(at, lambda talk: self._is_gone(talk, at, until))
+
+    def _is_gone(self, talk: Conversation, at: Seconds, until: Seconds) -> None:
+        talk.person_gone(at, until)
+        self._speeches.clear()
+
+    def take_over(self, other: "Talk", at: Seconds, *, goes_on: bool) -> None:
+        """Take what the person has said by another id; what is not decided of it is decided here.
+
+        goes_on: what they say by that id goes on. What both ids have said at one time, two reporters have told.
+        """
+        self.person_back()
+        for speech in sorted(other._speeches.values(), key=lambda each: each.since):
+            is_open = other._is_open(speech)
+            speech.actor = self.id
+            if speech.until is None and not goes_on:
+                speech.until = at
+            if any(each.overlaps(speech.since, speech.until) for each in self._speeches.values()):
+                self._scene.forget_spoken(speech)
+                if is_open and speech.since not in self._speeches:
+                    self._writer.decide_interjection(self.id, speech.since, "noise", at)
+                continue
+            self._speeches[speech.since] = speech
+            self.speech = speech if speech.until is None else self.speech
+            if is_open:
+                self._begin_again(speech)
+        self.go_on(at)
+
+    def _is_open(self, speech: OwnSpeech) -> bool:
+        """True if a speech is not decided."""
+        is_in_line = any(each is speech for _, each in self._line)
+        return is_in_line or self._conversation.listener.listens_to(speech.part)
+
+    def _begin_again(self, speech: OwnSpeech) -> None:
+        """Put a speech in line, in its place."""
+        since, until, speech.is_heard, speech.is_decided = speech.since, speech.until, False, False
+        speech.part = SignPart("speak", since, speech.part.confidence)
+        self._line.insert(self._place(since), (since, speech))
+        if until is not None:
+            step = lambda talk: talk.falls_silent(until) if speech.is_to(self._scene.robot) else None  # noqa: E731
+            self._line.insert(self._place(until), (until, step))
 
     def person_back(self) -> None:
         """Take the person's return: the robot may be speaking, or may have fallen silent meanwhile."""
         self._conversation.robot_speaks_since = self._scene.robot_speaks_to(self.id)
 
     def _own_speech(self, since: Seconds, confidence: Probability, face: str) -> OwnSpeech:
-        return OwnSpeech(actor=self.id, since=since, confidence=confidence, faces=FaceTimes(since, face))
+        """Begin to remember a speech."""
+        part = SignPart("speak", since, confidence)
+        speech = OwnSpeech(actor=self.id, since=since, part=part, faces=FaceTimes(since, face))
+        self.speech = self._speeches[since] = speech
+        return speech
 
     # -- the line -----------------------------------------------------------------------------------------------
 
@@ -262,12 +347,15 @@ class Talk(KindRecognizer):
 
     def take_early(self, at: Seconds, step: Step) -> None:
         """Take what happened at `at` and is known only now: it comes before all in line that happened later."""
-        place = sum(when <= at for when, _ in self._line)
-        if place:
+        if place := self._place(at):
             self._line.insert(place, (at, step))
         else:
             self._catch_up(at)
             step(self._conversation)
+
+    def _place(self, at: Seconds) -> int:
+        """Number of those in line that come before what happened at `at`."""
+        return next((n for n, (when, _) in enumerate(self._line) if when > at), len(self._line))
 
     def limit(self, wanted: Event) -> Seconds | None:
         if not EVENT_KINDS[wanted.kind].is_answered:
@@ -311,7 +399,12 @@ class Talk(KindRecognizer):
         self.take(at, lambda talk: talk.withdraw(event, at, is_orphan=is_orphan))
 
     def abort(self, at: Seconds, *, turn: str) -> None:
-        self.take(at, lambda talk: talk.abort(at, turn=turn))
+        # Who has interrupted the turn has done so before that, also if it is known only now, and told of `at`.
+        cut_off = CutOff(lambda talk: talk.abort(at, turn=turn))
+        if self._line or (self.asked_since < inf and self._scene.is_contested(self.id, at)):
+            self._line.append((nextafter(at, inf), cut_off))
+        else:
+            cut_off.step(self._conversation)
 
     def block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
         self.take(at, lambda talk: talk.block_ended(block, at, aborted=aborted))
@@ -324,19 +417,21 @@ class Talk(KindRecognizer):
             self.take(at, step)
 
     def _waits_for_others(self, at: Seconds) -> bool:
-        """True if somebody else may have answered the robot before `at`."""
-        return self._scene.is_contested(self.id, at)
+        """True if somebody else may have answered the robot before `at`. In its turn each who interrupts answers."""
+        return not self._conversation.is_into_turn(at) and self._scene.is_contested(self.id, at)
 
     @property
     def _is_behind_others(self) -> bool:
         """True if the first in line waits until it is known whether somebody else has answered before."""
         since = self.undecided_since
-        return since is not None and self._waits_for_others(since)
+        if since is None or isinstance(self._line[0][1], CutOff):
+            return since is not None and self._scene.is_contested(self.id, since)
+        return self._waits_for_others(since)
 
     @property
     def _undecided(self) -> list[OwnSpeech]:
         speeches = [each for _, each in self._line if isinstance(each, OwnSpeech)]
-        return [each for each in speeches if each.to is None or each.may_be_noise]
+        return [each for each in speeches if not each.is_decided and (each.to is None or each.may_be_noise)]
 
     @property
     def _undecided_first(self) -> OwnSpeech | None:
@@ -345,56 +440,65 @@ class Talk(KindRecognizer):
         return first if isinstance(first, OwnSpeech) and not self._is_known(first) else None
 
     def _may_be_noise(self, speech: OwnSpeech) -> bool:
-        """True if the first speech in line may be a cough. The conversation judges those into the robot's words."""
-        is_aside = speech.faces.most(speech.since) not in ("", self._scene.robot)
+        """True if the first speech in line may be a cough. Of who is alone with it the conversation judges."""
+        return speech.may_be_noise and bool(speech.company or not self._is_into_words(speech))
+
+    def _is_into_words(self, speech: OwnSpeech) -> bool:
+        """True of what is for the robot, as far as is known, and into its words: the conversation says what it is."""
+        may_be = speech.faces.most(speech.since) in ("", self._scene.robot)
         is_into_words = speech.is_beside or self._conversation.is_into_turn(speech.since)
-        return speech.may_be_noise and (is_aside or not is_into_words)
+        return is_into_words and (may_be if speech.to is None else speech.is_to(self._scene.robot))
 
     def _is_known(self, speech: OwnSpeech) -> bool:
         """True if it is known to whom the first speech in line is, and that it is one."""
-        return speech.to is not None and not self._may_be_noise(speech)
+        return speech.is_decided or (speech.to is not None and not self._may_be_noise(speech))
 
-    def _find(self, speech: OwnSpeech, face: str, at: Seconds) -> bool:
-        """Decide to whom the speech is if that is certain.
-
-        face: whose face the person looks at, if it begins in the robot's turn to them; else empty.
-        """
-        company = self._scene.company(self.id)
+    def _find(self, speech: OwnSpeech, at: Seconds) -> bool:
+        """Decide to whom the speech is if that is certain."""
+        speech.company |= self._scene.company(self.id)
         is_line = self._scene.lines.get(self.id) == speech.since
-        to = certain(speech, company, self._scene.robot, self._scene.names, is_line=is_line)
-        if to is None and face == self._scene.robot and not self._line:
-            to = frozenset((face,))  # into the robot's words to this person: it should hold at once
-        if to is not None:
+        to = certain(speech, self._scene.robot, self._scene.names, is_line=is_line)
+        if to is not None and to != speech.to:
             self._address(speech, to, at)
         return to is not None
 
     def _address(self, speech: OwnSpeech, to: Addressees, at: Seconds) -> None:
         speech.to = to
-        if speech.is_interjected and self._scene.robot not in to:
-            self._writer.interject(self.id, speech.since, "other", at)
+        if self._scene.robot not in to:
+            speech.is_open = False
+            self._writer.decide_interjection(self.id, speech.since, "other", at)
+        elif speech.until is None:
+            self._may_interrupt(speech, "", at)
         self._scene.note_spoken(speech)
 
     def _queue(self, at: Seconds, speech: OwnSpeech) -> None:
         is_next = speech.is_to(self._scene.robot) and self._waits_for_others(at)
         if self._line or not self._is_known(speech) or is_next:
             self._line.append((at, speech))
-        elif speech.is_to(self._scene.robot):
-            self._conversation.speaks(at, speech.confidence, beside=speech.is_beside)
+        else:
+            self._tell(speech)
+
+    def _tell(self, speech: OwnSpeech) -> None:
+        """Tell the conversation of a speech, if it is for the robot."""
+        if speech.is_to(self._scene.robot):
+            speech.is_heard = True
+            self._conversation.speaks(speech.part, beside=speech.is_beside)
+            is_sign = self._conversation.listener.listens_to(speech.part)
+            speech.is_open &= is_sign
+            self._is_known_speech(speech, is_known=not is_sign)
 
     def _decide(self, speech: OwnSpeech, at: Seconds) -> None:
         """Decide what the sound is, by what is known: nothing, if it is over and has no words; else to whom it is."""
         to = self._likely(speech, at) if speech.to is None else speech.to
-        # The conversation judges what is for the robot, and said into its words.
-        is_judged_here = self._may_be_noise(speech) or self._scene.robot not in to
+        is_judged_here = not self._is_into_words(speech) or self._scene.robot not in to
         is_noise = is_judged_here and speech.may_be_noise and speech.until is not None
-        speech.may_be_noise = False
+        speech.is_decided = True
+        self._is_known_speech(speech, is_known=is_judged_here)
         if is_noise:
-            speech.is_noise, speech.to = True, NOBODY
+            speech.is_noise, speech.is_open, speech.to = True, False, NOBODY
             self._writer.decide_interjection(self.id, speech.since, "noise", at)
         elif speech.to is None:
             self._address(speech, to, at)
-        if not (says_words(speech.words) or speech.is_to(self._scene.robot)):
-            self._wordless[speech.since] = speech
 
     def _likely(self, speech: OwnSpeech, at: Seconds) -> Addressees:
         """Addressees of a speech by what is likely."""
@@ -428,10 +532,10 @@ class Talk(KindRecognizer):
             if self._is_behind_others:
                 break
             self._line.popleft()
-            if not isinstance(item, OwnSpeech):
-                item(self._conversation)
-            elif item.is_to(self._scene.robot):
-                self._conversation.speaks(at, item.confidence, beside=item.is_beside)
+            if isinstance(item, OwnSpeech):
+                self._tell(item)
+            else:
+                (item.step if isinstance(item, CutOff) else item)(self._conversation)
         if not self._line:
             self._asked_in_line = inf
 

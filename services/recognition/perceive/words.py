@@ -165,6 +165,14 @@ class Words:
             ActionEnded(actor=words.actor, action="speak", at=ended),
         ]
 
+    def join(self, other: str, kept: str) -> None:
+        """Take two persons for one, who is `kept` from now on."""
+        if (said := self._people.pop(other, None)) is not None:
+            person = self._people.setdefault(kept, _Person())
+            person.speeches = sorted([*person.speeches, *said.speeches], key=_since)[-SPEECHES_KEPT:]
+            for id, known in said.utterances.items():
+                person.utterances[id] = known
+
     def forget(self, actor: str) -> None:
         self._people.pop(actor, None)
 

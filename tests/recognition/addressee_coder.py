@@ -1,0 +1,136 @@
+"""A coder of addressees: for whom each speech is, by its words, the looks, and what was said before.
+
+Takes nothing from the code that it judges. Definitions: docs/recognition.md, "To whom people speak".
+"""
+
+from collections.abc import Collection
+from math import inf
+
+from msgspec.structs import replace
+
+from tests.recognition.coder import BRIEF, FACE_GRACE, ROUND, WORDS_WAIT
+from tests.recognition.floor_coder import is_noise
+from tests.recognition.observations import ROBOT
+from tests.recognition.timeline import CALLED, LIMIT, Span, Timeline
+
+GREETINGS = ("hey", "hello")
+"""Words before a name that calls somebody, of those that are drawn."""
+SHORT = 3
+"""Words up to which a name at the end calls somebody."""
+HALF = 0.5
+
+
+def addressed(timeline: Timeline) -> Timeline:
+    """Return the timeline with each speech to whom it is; of sounds without words it makes no difference."""
+    rest = [each for each in timeline.spans if each.action != "speak"]
+    found = replace(timeline, spans=rest)
+    for speech in sorted((each for each in timeline.spans if each.action == "speak"), key=lambda each: each.since):
+        found = replace(found, spans=[*found.spans, replace(speech, to=addressee(speech, found))])
+    return found
+
+
+def addressee(speech: Span, before: Timeline) -> str:
+    """For whom a speech is; "": nobody knows. before: with looks, turns of the robot, all that was said before."""
+    if before.is_first and speech.known is not None and speech.until < speech.known and not _spoken(before):
+        found = _looked_at(speech, before) or _answered(speech, before)  # nobody knows that words will come
+        return found if found == ROBOT else called_by(speech.words, (ROBOT, *before.people), before.unseen) or found
+    is_decided = speech.known is not None and _held_at(speech, before) <= speech.known[0]
+    if speech.told and (before.tells == "early" or not is_decided):
+        return speech.told
+    if not is_decided and (called := called_by(speech.words, _known_by_name(speech, before), before.unseen)):
+        return called
+    if speech.is_line or not _company(speech, before):
+        return ROBOT
+    return _looked_at(speech, before) or _answered(speech, before)
+
+
+def _known_by_name(speech: Span, before: Timeline) -> tuple[str, ...]:
+    """Whom words can call: not who is known by another id alone when they come."""
+    at = speech.known or speech.since
+    unknown = {each.who for each in before.joins if at < each.at and not (each.is_known or each.changes)}
+    return (ROBOT, *(each for each in before.people if each not in unknown))
+
+
+def called_by(words: str, people: tuple[str, ...], unseen: Collection[str] = ()) -> str:
+    """Who is called: first, last after a comma, or last of a few words. A comma parts words where no blank does.
+
+    unseen: people of whom only the ids are known.
+    """
+    said = [each for each in words.replace("、", ", ").replace("。", ". ").split() if any(map(str.isalnum, each))]
+    plain = [each.strip(",.!?").casefold() for each in said]
+    if plain and plain[0] in GREETINGS:
+        plain, said = plain[1:], said[1:]
+    plain = [each.removesuffix("さん") for each in plain]
+    names = [(name.casefold().split(), who) for who in people for name in (who, CALLED.get(who, ""))
+             if name == who or (name and who not in unseen)]  # fmt: skip
+    for parts, who in sorted(names, key=lambda each: -len(each[0])):
+        if plain[: len(parts)] == parts:
+            return who
+        rest = said[: -len(parts)]
+        if plain[-len(parts) :] == parts and (len(rest) < SHORT or rest[-1].endswith(",")):
+            return who
+    return ""
+
+
+def _spoken(before: Timeline) -> list[Span]:
+    return [each for each in before.spans if each.action == "speak"]
+
+
+def _held_at(speech: Span, before: Timeline) -> float:
+    """When a speech into the robot's turn that goes on is an interruption or the answer, by the look at the robot."""
+    for turn in before.turns:
+        if speech.who in turn.to and turn.since < speech.since < turn.until:
+            decided = speech.since[0] + WORDS_WAIT
+            if not before.is_worded:
+                decided = min(turn.until[0], speech.since[0] + BRIEF)
+            faces = {
+                each.to for each in before.spans
+                if each.who == speech.who and each.action == "look"
+                and each.since[0] <= decided and each.until > speech.since
+            }  # fmt: skip
+            if speech.until[0] > decided and faces == {ROBOT}:
+                return decided
+    return inf
+
+
+def _company(speech: Span, before: Timeline) -> list[str]:
+    """Others who are there when somebody speaks."""
+    at = speech.since[0]
+    gone = {
+        each.who for each in before.away
+        if each.until[0] - each.since[0] >= FACE_GRACE and each.since[0] + FACE_GRACE <= at < each.until[0]
+    }  # fmt: skip
+    return [each for each in before.people if each != speech.who and each not in gone]
+
+
+def _looked_at(speech: Span, before: Timeline) -> str:
+    """Whose face the speaker looks at for more than half of the speech."""
+    seconds: dict[str, float] = {}
+    for each in before.spans:
+        if each.who == speech.who and each.action == "look" and each.to in (ROBOT, *_company(speech, before)):
+            common = min(each.until[0], speech.until[0]) - max(each.since[0], speech.since[0])
+            seconds[each.to] = seconds.get(each.to, 0.0) + max(0.0, common)
+    return next((face for face, common in seconds.items() if common > HALF * speech.seconds + ROUND), "")
+
+
+def _answered(speech: Span, before: Timeline) -> str:
+    """Who has spoken to the speaker last, or to whom the speaker has; "": neither, as long as an answer may take."""
+    at, decided = speech.since[0], max(speech.until, speech.known or speech.until)
+    heard: list[tuple[float, float, str, str]] = []
+    for turn in before.turns:
+        if speech.who in turn.to:
+            heard += [(until[0], since[0], ROBOT, "") for since, until in turn.speech]
+    for each in before.spans:
+        if each.action == "speak" and not is_noise(each, before) and speech.who in (each.who, each.to):
+            if each.who != speech.who and each.until > decided and before.tells != "early":
+                continue  # nobody knows yet to whom it is
+            heard.append((each.until[0], each.since[0], each.who, each.to))
+    recent = [
+        (min(until, at), since, who, to) for until, since, who, to in heard if since < at <= until + LIMIT + ROUND
+    ]
+    if not recent:
+        return ""
+    _, _, who, to = max(recent)
+    if who != speech.who:
+        return who
+    return to
