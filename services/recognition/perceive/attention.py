@@ -5,9 +5,10 @@
     actions = attention.advance(now)                # whenever `attention.deadline` has been reached
 
 A symbolic report of an action has precedence: from the first one on, raw perception of that action of that person is
-ignored, as long as the `Attention` lives. A look is always at something, if only away; so where none is reported for
-`FACE_GRACE`, it is no more, and heads count (who plays a person lets a camera see them). Actions carry the times at which they began and ended, though they are
-known only later; until then `undecided` says from when on.
+ignored, as long as the `Attention` lives. A look is always at something, if only away: so where none goes on for
+`FACE_GRACE`, nobody reports looks any more, and heads count again, as of who played a person by hand and now lets a
+camera see them. Actions carry the times at which they began and ended, though they are known only later; until then
+`undecided` says from when on.
 
 How much a head attends to the robot is a matter of degree, and of the person: see `attending.py`.
 """
