@@ -15,7 +15,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.sound import SoundFrame
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.console.web import sounds
+from engage_hri.services.console.web import links, sounds
 from engage_hri.services.console.web.sounds import Sounds
 
 FRAME = bytes(range(64))
@@ -222,7 +222,7 @@ async def test_a_page_that_sends_sound_where_it_is_to_play_is_cut_off(hub: Memor
 
 
 async def test_there_is_room_for_so_many_pages_and_no_more(hub: MemoryHub, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sounds, "MOST_SOUNDS", 2)
+    monkeypatch.setattr(links, "MOST_LINKS", 2)
     async with window(hub) as place:
         pages = [await place.voice() for _ in range(3)]
         pages[0].go()

@@ -1,4 +1,4 @@
-"""Who sits at a page, from what its camera sees: one person, whose place and name are those of the seat. Pure.
+"""A person who sits at a page, from what its camera sees: name and place are those of the seat. Pure.
 
     seen = SeatSeeing(config, "ann", seat)
     told = seen.feed(landmarks, at)
@@ -40,18 +40,18 @@ class SeatSeeing:
         """Take what their camera has seen in a picture. Returns what is new, in order. at: of the picture."""
         if not self._seeing.follows:
             self._last = None
-        return self._named(self._seeing.feed(replace(landmarks, faces=tuple(self._own(landmarks.faces))), at))
+        told = self._named(self._seeing.feed(replace(landmarks, faces=tuple(self._own(landmarks.faces))), at))
+        for each in told:
+            if isinstance(each, PersonCame | PersonGone):
+                self.is_here = isinstance(each, PersonCame)
+        return told
 
     def end(self) -> list[Seen]:
-        """Take it that the camera looks no more: what they do with their head has ended."""
+        """Take it that the camera looks no more: what they do with their head has ended, and nobody has gone."""
         return [each for each in self._named(self._seeing.end()) if not isinstance(each, PersonGone)]
 
     def _named(self, told: Iterable[Seen]) -> list[Seen]:
-        named = [each._replace(person=self._person) for each in told]
-        for each in named:
-            if isinstance(each, PersonCame | PersonGone):
-                self.is_here = isinstance(each, PersonCame)
-        return named
+        return [each._replace(person=self._person) for each in told]
 
     def _own(self, faces: tuple[FacePoints, ...]) -> Iterable[FacePoints]:
         """The face of the one at the page, if it is among these."""
