@@ -129,8 +129,9 @@ async def demonstrate(
         )
         with scene_view(console, config.robot, began, live) as show:
             async with beside as shown:
-                hears = options.is_for_visitors and config.control.has_voice and has_hearing()
-                play = partial(play_tangram, config, (show, tallying, outputs), hub, options.record, hears=hears)
+                ears = ("hearing",) if config.control.has_voice and has_hearing() else ()
+                senses = (*ears, "eyes") if options.is_for_visitors else ()
+                play = partial(play_tangram, config, (show, tallying, outputs), hub, options.record, senses=senses)
                 await (_again_and_again(play, shown) if options.kiosk and shown else play())
     return tallying.tally
 
