@@ -63,7 +63,7 @@ LAYERS = {
     " > contract > config motion",
     "services/perception": "eyes hearing > child offered",
     "services/perception/eyes": "service > pages > people seat > watching > sources > seeing > nodding tracking"
-    " > camera head_pose one_euro > looking > packages > config",
+    " > camera head_pose one_euro > looking > config",
     "services/perception/hearing": "service > device pages > intake > speeches"
     " > company listening microphone own_voice recognizers > recognizing sound > voice > config",
     "services/commandline": "look robot study talk > app bodies embedding > shell",

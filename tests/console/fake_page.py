@@ -5,7 +5,7 @@ import json
 import struct
 from typing import Any
 
-from starlette.websockets import WebSocket
+from engage_hri.services.console.web import links
 
 FRAME = bytes(range(64))
 
@@ -19,7 +19,7 @@ class FakePage:
         self._says: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
         self.say({"type": "websocket.connect"})
         scope = {"type": "websocket", "path": "/", "query_string": query.encode(), "headers": []}
-        self.link = WebSocket(scope, self._says.get, self._take)
+        self.link = links.WebSocket(scope, self._says.get, self._take)
 
     async def _take(self, message: Any) -> None:
         if message["type"] == "websocket.close":

@@ -12,7 +12,6 @@ import pytest
 pytest.importorskip("starlette", reason="needs the extra `console`")
 
 import httpx
-from starlette.applications import Starlette
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.landmarks import FACE_POINTS, FaceLandmarks, FacePoints
@@ -20,12 +19,12 @@ from engage_hri.schemas.perception import ActionBegan, ActionEnded, HeadPose
 from engage_hri.schemas.units import Vector
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.console.web import sights
+from engage_hri.services.console.web import server, sights
 from engage_hri.services.console.web.own_look import GLANCE
 from engage_hri.services.console.web.server import PAGE
 from engage_hri.services.console.web.sights import POLICY, Sights
 from engage_hri.services.console.web.visitor import Visitor
-from engage_hri.services.perception.eyes.packages import PARCELS
+from engage_hri.services.runtime.parcels import PARCELS
 from tests.console.fake_page import FakePage
 from tests.console.test_seats import give, visitors
 
@@ -215,7 +214,7 @@ async def test_the_page_has_what_finds_faces_from_here_and_nothing_else(
     monkeypatch.setenv("ENGAGE_DATA", str(tmp_path))
     (tmp_path / "eyes").mkdir()
     (tmp_path / "eyes" / "mine.txt").write_text("not yours")
-    app = Starlette(routes=Sights(hub.join("console"), lambda session: None).routes(PAGE))
+    app = server.Starlette(routes=Sights(hub.join("console"), lambda session: None).routes(PAGE))
     async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://here") as browser:
         wanted = "/eyes/litert_wasm_compat_internal.wasm"
         missing = await browser.get(wanted)

@@ -8,7 +8,8 @@ from typing import Annotated, Literal
 import typer
 
 from engage_hri.services.commandline.shell.process import DONE
-from engage_hri.services.perception.eyes.packages import PARCELS, data_folder, download, install
+from engage_hri.services.runtime.packages import data_folder, download, install
+from engage_hri.services.runtime.parcels import PARCELS
 
 
 @dataclass(frozen=True, kw_only=True)

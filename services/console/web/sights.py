@@ -27,7 +27,8 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.console.web.links import NONSENSE, NOT_YOURS, TOO_MUCH, PageLinks
 from engage_hri.services.console.web.visitor import Visitor
-from engage_hri.services.perception.eyes.packages import PARCELS, data_folder
+from engage_hri.services.runtime.packages import data_folder
+from engage_hri.services.runtime.parcels import PARCELS
 
 MOST_PICTURES = 60
 """Pictures in a second that a page may tell of."""
@@ -55,7 +56,7 @@ class Sights(PageLinks):
     """The links of all pages for their cameras."""
 
     def routes(self, page: Path) -> list[BaseRoute]:
-        """Where a page finds the link, and what finds faces. page: folder of the scripts."""
+        """Make the routes to the link, and to what finds faces. page: folder of the scripts."""
 
         async def worker(request: Request) -> Response:
             headers = {"content-security-policy": POLICY, "cache-control": "no-cache"}
@@ -108,7 +109,7 @@ class Sights(PageLinks):
                     look.is_at(received.message.position)
 
     def _of_page(self, content: bytes) -> FaceLandmarks | None:
-        """What a page has told; None: it is nothing of the kind. The picture was not taken later than now."""
+        """Read what a page has told; None: it is nothing of the kind. The picture was not taken later than now."""
         if len(content) < _HEADER.size:
             return None
         at, _, width, height, count = _HEADER.unpack_from(content)

@@ -19,7 +19,6 @@ from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import Bus, Subscription
 from engage_hri.services.perception.eyes.config import PAGE, EyesConfig
 from engage_hri.services.perception.eyes.looking import settings_of
-from engage_hri.services.perception.eyes.packages import data_folder
 from engage_hri.services.perception.eyes.pages import PageEyes
 from engage_hri.services.perception.eyes.people import SeenPeople
 from engage_hri.services.perception.eyes.seeing import Seeing
@@ -30,6 +29,7 @@ from engage_hri.services.perception.eyes.watching import (
     SourceOrder,
     Watching,
 )
+from engage_hri.services.runtime.packages import data_folder
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 

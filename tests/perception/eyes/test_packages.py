@@ -10,14 +10,8 @@ from typing import Literal
 import pytest
 
 from engage_hri.schemas.faults import InputRefused, RunFailed
-from engage_hri.services.perception.eyes.packages import (
-    FACE_MODELS,
-    PAGE_RUNTIME,
-    Parcel,
-    data_folder,
-    download,
-    install,
-)
+from engage_hri.services.runtime.packages import data_folder, download, install
+from engage_hri.services.runtime.parcels import FACE_MODELS, PAGE_RUNTIME, Parcel
 from tests.cli.command import engage
 
 
@@ -83,6 +77,7 @@ def test_without_a_network_the_command_says_which_file_it_wants(
     assert not (tmp_path / "data").exists()
 
 
+@pytest.mark.real_time
 def test_a_client_that_has_not_got_a_package_is_told_with_what_to_carry(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
