@@ -31,7 +31,7 @@ PURE_MACHINERY = {
     "services/requests/asking.py", "services/requests/asking_table.py",
     "services/requests/serving.py", "services/requests/serving_table.py",
     "services/runtime/again.py", "services/runtime/installation.py",
-    "services/runtime/intake.py",
+    "services/runtime/intake.py", "services/runtime/parcels.py",
     "services/runtime/steps.py",
     "services/client/chunking.py", "services/client/event_stream.py", "services/client/people/actions.py",
     "services/client/people/shared_world.py", "services/bus/deadlines.py", "services/bus/samples.py",
