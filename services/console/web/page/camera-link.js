@@ -112,7 +112,10 @@ async function begin(address) {
 
 onmessage = async ({ data }) => {
   if (data.place) return begin(data.place);
-  if (data.picture) return look(data.picture, data.taken - performance.timeOrigin, data.rate);
+  if (data.picture) {
+    look(data.picture, data.taken - performance.timeOrigin, data.rate);
+    return postMessage({ next: true });
+  }
   const reader = data.pictures.getReader();
   for (let next = await reader.read(); !next.done; next = await reader.read()) look(next.value, undefined, data.rate);
 };

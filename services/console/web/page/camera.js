@@ -22,11 +22,11 @@ async function look(own, track) {
   }
   own.video = Object.assign(document.createElement("video"), { muted: true, playsInline: true, srcObject: own.stream });
   await own.video.play();
-  const next = (now, { captureTime = now }) => {
+  const wait = () => own.video.requestVideoFrameCallback((now, { captureTime = now }) => {
     if (!own.video.srcObject) return;
     const picture = new VideoFrame(own.video, { timestamp: 0 });
     own.worker.postMessage({ picture, taken: performance.timeOrigin + captureTime, rate: RATE }, [picture]);
-    own.video.requestVideoFrameCallback(next);
-  };
-  own.video.requestVideoFrameCallback(next);
+  });
+  own.worker.addEventListener("message", ({ data }) => data.next && wait()); // the newest, once the last one was looked at
+  wait();
 }
