@@ -187,6 +187,16 @@ async def test_the_page_tells_the_heads_that_litert_sees_in_the_same_film(seen: 
     assert {each.actor for each in poses} == {"ann"}
 
 
+async def test_the_window_shows_where_who_is_seen_looks(seen: HeardPlace):
+    """The seat says that they look at the robot, until they are seen: then they look away and back as the film has it."""
+    looks = "window.engage.state.scene.people.find((each) => each.id === 'ann').looks"
+    async with sitting(seen) as one:
+        await one.page.until(f"{looks}?.includes('robot')", 5.0)
+        await one.press()
+        await one.page.until(f"{looks} && !{looks}.includes('robot')", 40.0)
+        await one.page.until(f"{looks}?.includes('robot')", 20.0)
+
+
 async def test_nothing_as_large_as_a_picture_leaves_the_page(seen: HeardPlace):
     """All that the browser sends to anybody goes through here."""
     sent, upstream, writers = 0, urlsplit(seen.url), list[asyncio.StreamWriter]()

@@ -57,9 +57,10 @@ export function finder(detect, mesh, most) {
     const across = Math.floor((DETECTED - wide) / 2);
     const down = Math.floor((DETECTED - tall) / 2);
     const small = new Float32Array(DETECTED * DETECTED * 3).fill(-1);
-    shrunk(picture, part, wide, tall, (x, y, color, value) => {
-      small[((down + y) * DETECTED + across + x) * 3 + color] = value / 127.5 - 1;
-    });
+    const colors = shrunk(picture, part, wide, tall);
+    for (let y = 0; y < tall; y += 1) {
+      for (let at = 0; at < wide * 3; at += 1) small[((down + y) * DETECTED + across) * 3 + at] = colors[y * wide * 3 + at] / 127.5 - 1;
+    }
     const [boxes, scores] = detect(small).sort((one, other) => other.length - one.length);
     let sure = ANCHORS.map((_, index) => index).filter((index) => scores[index] > 0); // a logarithm of chances: 0 is one half
     sure.sort((one, other) => scores[other] - scores[one]);
@@ -91,10 +92,11 @@ export function finder(detect, mesh, most) {
     const scale = crop.side / MESHED;
     const [c, s] = [Math.cos(crop.angle), Math.sin(crop.angle)];
     const place = (x, y) => [crop.x + (c * x - s * y) * scale, crop.y + (s * x + c * y) * scale]; // x, y: from the middle of the square
-    for (let row = 0, at = 0; row < MESHED; row += 1) {
-      for (let column = 0; column < MESHED; column += 1, at += 3) {
-        const [x, y] = place(column + 0.5 - MESHED / 2, row + 0.5 - MESHED / 2);
-        blend(picture, x - 0.5, y - 0.5, patch, at);
+    const [across, down] = [c * scale, s * scale]; // from one column to the next
+    for (let row = 0; row < MESHED; row += 1) {
+      const [left, top] = place(0.5 - MESHED / 2, row + 0.5 - MESHED / 2);
+      for (let column = 0; column < MESHED; column += 1) {
+        blend(picture, left - 0.5 + column * across, top - 0.5 + column * down, patch, (row * MESHED + column) * 3);
       }
     }
     const [values, score] = mesh(patch).sort((one, other) => other.length - one.length);
@@ -108,12 +110,16 @@ export function finder(detect, mesh, most) {
   return { find };
 }
 
-// Color between four pixels, 0..1; beyond the edge it is that of the edge.
+// Color between four pixels, 0..1; beyond the edge it is that of the edge. It is called for each pixel, and so makes nothing.
 function blend({ width, height, data }, x, y, out, at) {
-  const [left, top] = [Math.floor(x), Math.floor(y)];
-  const [right, low] = [x - left, y - top];
-  const [l, r] = [left, left + 1].map((each) => Math.min(Math.max(each, 0), width - 1) * 4);
-  const [t, b] = [top, top + 1].map((each) => Math.min(Math.max(each, 0), height - 1) * width * 4);
+  const left = Math.floor(x);
+  const top = Math.floor(y);
+  const right = x - left;
+  const low = y - top;
+  const l = Math.min(Math.max(left, 0), width - 1) * 4;
+  const r = Math.min(Math.max(left + 1, 0), width - 1) * 4;
+  const t = Math.min(Math.max(top, 0), height - 1) * width * 4;
+  const b = Math.min(Math.max(top + 1, 0), height - 1) * width * 4;
   for (let color = 0; color < 3; color += 1) {
     const above = data[t + l + color] * (1 - right) + data[t + r + color] * right;
     const below = data[b + l + color] * (1 - right) + data[b + r + color] * right;
@@ -121,35 +127,42 @@ function blend({ width, height, data }, x, y, out, at) {
   }
 }
 
-// A part of a picture, made smaller: each pixel is the mean of what it covers. put: gets column, row, color and value.
-function shrunk({ width, data }, part, wide, tall, put) {
+// A part of a picture, made smaller: each pixel is the mean of what it covers. Returns its colors, by rows.
+function shrunk({ width, data }, part, wide, tall) {
   const [columns, rows] = [covered(part.width, wide), covered(part.height, tall)];
+  const small = new Float32Array(wide * tall * 3);
   for (let y = 0; y < tall; y += 1) {
+    const high = rows[y];
     for (let x = 0; x < wide; x += 1) {
-      let [red, green, blue] = [0, 0, 0];
-      for (const [row, high] of rows[y]) {
-        for (const [column, broad] of columns[x]) {
-          const at = ((part.top + row) * width + part.left + column) * 4;
-          const weight = high * broad;
-          red += data[at] * weight;
-          green += data[at + 1] * weight;
-          blue += data[at + 2] * weight;
+      const broad = columns[x];
+      let red = 0;
+      let green = 0;
+      let blue = 0;
+      for (let j = 0; j < high.shares.length; j += 1) {
+        const begin = ((part.top + high.from + j) * width + part.left + broad.from) * 4;
+        for (let i = 0; i < broad.shares.length; i += 1) {
+          const weight = high.shares[j] * broad.shares[i];
+          red += data[begin + 4 * i] * weight;
+          green += data[begin + 4 * i + 1] * weight;
+          blue += data[begin + 4 * i + 2] * weight;
         }
       }
-      put(x, y, 0, Math.round(red));
-      put(x, y, 1, Math.round(green));
-      put(x, y, 2, Math.round(blue));
+      const at = (y * wide + x) * 3;
+      small[at] = Math.round(red);
+      small[at + 1] = Math.round(green);
+      small[at + 2] = Math.round(blue);
     }
   }
+  return small;
 }
-// Which of many pixels in a row each of few covers, and with which share of it.
+// Which of many pixels in a row each of few covers: the first, and the share that it has of each from there on.
 function covered(many, few) {
   const step = many / few;
   return Array.from({ length: few }, (_, index) => {
-    const [from, to] = [index * step, (index + 1) * step];
-    const own = [];
-    for (let at = Math.floor(from); at < Math.min(many, Math.ceil(to - 1e-9)); at += 1) own.push([at, (Math.min(to, at + 1) - Math.max(from, at)) / step]);
-    return own;
+    const [begin, end] = [index * step, (index + 1) * step];
+    const from = Math.floor(begin);
+    const until = Math.min(many, Math.ceil(end - 1e-9));
+    return { from, shares: Array.from({ length: until - from }, (_, k) => (Math.min(end, from + k + 1) - Math.max(begin, from + k)) / step) };
   });
 }
 
