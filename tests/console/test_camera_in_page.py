@@ -188,7 +188,7 @@ async def test_the_page_tells_the_heads_that_litert_sees_in_the_same_film(seen: 
 
 
 async def test_the_window_shows_where_who_is_seen_looks(seen: HeardPlace):
-    """The seat says that they look at the robot, until they are seen: then they look away and back as the film has it."""
+    """The seat says that they look at the robot, until they are seen: then they look away and back as in the film."""
     looks = "window.engage.state.scene.people.find((each) => each.id === 'ann').looks"
     async with sitting(seen) as one:
         await one.page.until(f"{looks}?.includes('robot')", 5.0)
