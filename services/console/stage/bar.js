@@ -47,8 +47,7 @@ export function bar({ top, bottom, order, turn, session }) {
     robot.press();
   }, drawing("mute"));
   const who = element("p", { class: "who" }, element("i", { class: "ring" }), element("b", {}), element("span", { class: "level" }));
-  const see = button("see", () => eye.press(), drawing("eye"));
-  top.append(who, see, loud, other);
+  top.append(who, loud, other);
 
   const hint = element("p", { class: "hint", role: "status" });
   const sit = button("sit", () => {
@@ -86,7 +85,8 @@ export function bar({ top, bottom, order, turn, session }) {
   hold.addEventListener("contextmenu", (event) => event.preventDefault());
   const words = element("input", { type: "text", maxlength: "400", autocomplete: "off", enterkeyhint: "send" });
   const send = element("button", { type: "submit", class: "send" }, drawing("send"));
-  const form = element("form", { class: "say" }, hold, words, send);
+  const see = button("see", () => eye.press(), drawing("eye"));
+  const form = element("form", { class: "say" }, hold, see, words, send);
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     if (words.value.trim()) order({ do: "type", text: words.value.trim() });
