@@ -7,7 +7,7 @@ import asyncio
 import importlib.util
 import os
 import signal
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -81,19 +81,25 @@ class Sitting:
         """What the camera has told, with local times."""
         return [(at, each) for at, each in self.told if isinstance(each, FaceLandmarks) and not each.over]
 
-    async def got(self, count: int, seconds: float = 60.0) -> None:
-        """Wait until so many pictures have been told."""
+    async def until(self, is_so: Callable[[], bool], seconds: float = 5.0) -> None:
+        """Wait until this is so, of what came to the bus."""
         async with asyncio.timeout(seconds):
-            while len(self.seen) < count:
+            while not is_so():
                 self.came.clear()
                 await self.came.wait()
 
+    async def got(self, count: int, seconds: float = 60.0) -> None:
+        """Wait until so many pictures have been told."""
+        await self.until(lambda: len(self.seen) >= count, seconds)
+
     async def ended(self) -> None:
         """Wait until the bus knows that the camera is off."""
-        async with asyncio.timeout(5):
-            while not any(isinstance(each, FaceLandmarks) and each.over for _, each in self.told):
-                self.came.clear()
-                await self.came.wait()
+        await self.until(lambda: any(isinstance(each, FaceLandmarks) and each.over for _, each in self.told))
+
+    def looks(self) -> list[type]:
+        """Beginnings and ends of looks that were reported, in their order."""
+        kinds = ActionBegan | ActionEnded
+        return [type(each) for _, each in self.told if isinstance(each, kinds) and each.action == "look"]
 
     async def press(self) -> None:
         await press(self.page, "#camera")
@@ -262,13 +268,7 @@ async def test_it_is_off_at_one_press_and_the_look_is_as_one_says(seen: HeardPla
         await one.page.until("!document.querySelector('#camera.light')", 1.0)
         await one.ended()
         assert await one.page.value("stream.getTracks().every((each) => each.readyState === 'ended')")
-        await asyncio.sleep(0.3)
-
-        looks = [
-            type(each) for _, each in one.told
-            if isinstance(each, ActionBegan | ActionEnded) and each.action == "look"
-        ]  # fmt: skip
-        assert looks[-2:] == [ActionEnded, ActionBegan]
+        await one.until(lambda: one.looks()[-2:] == [ActionEnded, ActionBegan])
         assert not any(isinstance(each, ActorLost) for _, each in one.told)
 
 
