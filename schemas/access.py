@@ -231,6 +231,7 @@ TABLE: tuple[Row, ...] = (
     ),
     Row("control", "publishes", keys.ROBOT_SOUND, "told while somebody plays it, or tells it from people's voices"),
     Row("perception", "publishes", keys.ANY_LANDMARKS, "of cameras: points of faces, for recordings"),
+    Row("perception", "subscribes", keys.ANY_LANDMARKS, "for eyes, of the cameras of pages"),
     Row("perception", "publishes", keys.ANY_SOUND, "of microphones"),
     Row("perception", "subscribes", keys.ANY_SOUND, "for those who hear what people say"),
     Row("perception", "subscribes", keys.ROBOT_SOUND, "told from the voices of people"),
@@ -257,8 +258,10 @@ TABLE: tuple[Row, ...] = (
     *_looks("wizard"),
     *(
         Row("wizard", "publishes", key, "says what perception does not see; visitors of `engage console` are people")
-        for key in (keys.PERCEIVED_ACTION, keys.UTTERANCE, _OWN_ONGOING, keys.WORLD, keys.ANY_SOUND)
+        for key in (keys.PERCEIVED_ACTION, keys.UTTERANCE, _OWN_ONGOING, keys.WORLD, keys.ANY_SOUND,
+                    keys.ANY_LANDMARKS)
     ),
+    Row("wizard", "subscribes", keys.ANY_HEAD_POSE, "for the places of visitors whom a camera of their page sees"),
 )  # fmt: skip
 """The table. `tests/access` checks it against what really flows."""
 

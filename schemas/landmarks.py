@@ -34,9 +34,11 @@ class FaceLandmarks(Struct, frozen=True, kw_only=True, tag="face_landmarks", omi
     """stream: perception. All faces that a source has found in one picture; none: it has looked, and saw nobody.
 
     at: when the picture was taken; the source has looked until then. width, height: of the picture, in pixels.
+    over: there was no picture: the source, which people switch on and off, looks no more.
     """
 
     at: Stamp
     width: Pixels
     height: Pixels
     faces: Annotated[tuple[FacePoints, ...], Meta(max_length=MOST_FACES)] = ()
+    over: bool = False

@@ -26,7 +26,9 @@ SHELLS = {
     "services/control/voice/sounding.py",  # a body that speaks on the loop's clock
     "services/console/web/sessions.py",  # ends sessions whose page does not come back
     "services/perception/child.py",  # a process with pipes
-    "services/perception/eyes/packages.py",  # runs pip
+    "services/runtime/packages.py",  # runs pip and npm
+    "services/perception/eyes/pages.py",  # takes what cameras of pages see
+    "services/perception/eyes/people.py",  # publishes people and heads
     "services/perception/eyes/watching.py",  # runs the process of a source
     "services/perception/eyes/sources/pictures.py",  # a camera, in that process
     "services/perception/hearing/company.py",  # publishes people and faults
@@ -41,7 +43,10 @@ SHELLS = {
     "services/tangram/collaboration/host.py",  # asks people who talk
     "services/console/follow.py",  # subscribes
     "services/console/terminal/live.py",  # draws
+    "services/console/web/links.py",  # waits for what pages send
+    "services/console/web/own_look.py",  # ends a glance
     "services/console/web/server.py",  # serves the page
+    "services/console/web/sights.py",  # what cameras of pages see
     "services/console/web/sounds.py",  # sound to the page, and from it
     "services/console/web/visitor.py",  # carries out orders
 }

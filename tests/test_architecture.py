@@ -31,7 +31,7 @@ PURE_MACHINERY = {
     "services/requests/asking.py", "services/requests/asking_table.py",
     "services/requests/serving.py", "services/requests/serving_table.py",
     "services/runtime/again.py", "services/runtime/installation.py",
-    "services/runtime/intake.py",
+    "services/runtime/intake.py", "services/runtime/parcels.py",
     "services/runtime/steps.py",
     "services/client/chunking.py", "services/client/event_stream.py", "services/client/people/actions.py",
     "services/client/people/shared_world.py", "services/bus/deadlines.py", "services/bus/samples.py",
@@ -62,8 +62,8 @@ LAYERS = {
     "services/control": "mujoco reachy_mini torso > figure service testing > bases calibrating serving voice"
     " > contract > config motion",
     "services/perception": "eyes hearing > child offered",
-    "services/perception/eyes": "service > watching > sources > seeing > nodding tracking"
-    " > camera head_pose one_euro > looking > packages > config",
+    "services/perception/eyes": "service > pages > people seat > watching > sources > seeing > nodding tracking"
+    " > camera head_pose one_euro > looking > config",
     "services/perception/hearing": "service > device pages > intake > speeches"
     " > company listening microphone own_voice recognizers > recognizing sound > voice > config",
     "services/commandline": "look robot study talk > app bodies embedding > shell",
@@ -81,8 +81,8 @@ THREADS = {"threading", "_thread", "concurrent", "multiprocessing"}
 THREAD_CALLS = {"to_thread", "run_in_executor", "Thread", "ThreadPoolExecutor"}
 
 WEB = {"starlette", "uvicorn"}
-WITH_WEB = {"services/console/web/server.py", "services/console/web/sounds.py"}
-"""The only file with a web stack. It is the exception to "no threads": it reads the files of the page on worker
+WITH_WEB = {f"services/console/web/{name}.py" for name in ("server", "links", "sights", "sounds")}
+"""The only files with a web stack. They are the exception to "no threads": it reads the files of the page on worker
 threads, which touch nothing of ours; pages, frames and orders stay on the one loop."""
 
 NO_SUBJECTS = re.compile(

@@ -101,15 +101,15 @@ async def tangram(
     hub: Hub | None = None,
     record: Path | None = None,
     *,
-    hears: bool = False,
+    senses: Iterable[str] = (),
 ) -> AsyncIterator[asyncio.Event]:
     """Run all services: the body of `async with` begins once they stand. Yields an event: the task is over.
 
     sinks: get all messages, with instants of this loop. hub: the bus on which they run, for others to look on; None:
-    one in memory. record: a file for all that is said. hears: hearing runs as well.
+    one in memory. record: a file for all that is said. senses: services that run as well.
     """
     async with MemoryHub(config.robot, decodes=False) if hub is None else nullcontext(hub) as hub:
-        bound = services(config, *roster.PLAY, *(("hearing",) if hears else ()))
+        bound = services(config, *roster.PLAY, *senses)
         kept = recording(hub.join("record"), record, (keys.EVERYTHING,), {}) if record else nullcontext()
         bus = hub.join("console")
         try:

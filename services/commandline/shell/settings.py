@@ -19,9 +19,9 @@ TRANSCRIPT = ("recognition.gaze_resolution=table",)
 piece."""
 FROM_PAGES = (f"hearing.source={PAGE}",)
 """Settings of ears for whoever sits at a page, and may switch a microphone on there."""
-AT_PAGES = (*FROM_PAGES, "control.drivers.espeak.device=none")
-"""Settings of a robot that is talked with at pages: they have its voice as well. Two loudspeakers at one table are an
-echo, and a machine without a sound card has none."""
+AT_PAGES = (*FROM_PAGES, f"eyes.source={PAGE}", "control.drivers.espeak.device=none")
+"""Settings of a robot that is met at pages: they have cameras, and its voice as well. Two loudspeakers at one table
+are an echo, and a machine without a sound card has none."""
 
 
 class RobotConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

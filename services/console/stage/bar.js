@@ -1,15 +1,17 @@
 // The bars: above the language, below the one large button, and what a person at the table can do.
+import { camera } from "../page/camera.js";
 import { element } from "../page/look.js";
 import { microphone } from "../page/microphone.js";
 import { voice } from "../page/voice.js";
 import { put } from "./heads.js";
 
 const icon = (path) => `<svg viewBox="0 0 24 24" width="26" height="26" fill="none" stroke="currentColor" stroke-width="2" stroke-linecap="round" stroke-linejoin="round" aria-hidden="true">${path}</svg>`;
-const STAYS = 12000; // ms for which it is told why the microphone, or the voice, went off
+const STAYS = 12000; // ms for which it is told why microphone, camera or voice went off
 const ICONS = {
   mic: icon('<rect x="9" y="3" width="6" height="11" rx="3"/><path d="M5 11a7 7 0 0 0 14 0M12 18v3"/>'),
   loud: icon('<path d="M4 9.5v5h3.5L12 18.5v-13L7.5 9.5zM15.5 9a4 4 0 0 1 0 6M18 6.5a8 8 0 0 1 0 11"/>'),
   mute: icon('<path d="M4 9.5v5h3.5L12 18.5v-13L7.5 9.5zM16 9.5l5 5m0-5-5 5"/>'),
+  eye: icon('<rect x="3" y="7" width="12.5" height="10.5" rx="2.5"/><path d="m15.5 11.5 5.5-3v8l-5.5-3z"/>'),
   send: icon('<path d="M4 12 20 4l-4 16-4-7z"/>'),
   nod: icon('<circle cx="12" cy="12" r="8"/><path d="M12 8v7m-3-3 3 3 3-3"/>'),
   point: icon('<path d="M9 12V5a1.5 1.5 0 0 1 3 0v5l4 1a3 3 0 0 1 2 3l-.5 3a4 4 0 0 1-4 3H12a4 4 0 0 1-3.2-1.6L5.5 14A1.6 1.6 0 0 1 8 12z"/>'),
@@ -23,7 +25,8 @@ export function bar({ top, bottom, order, turn, session, examples, spoken }) {
   let isSitting = false;
   let isSpeaking = false;
   let isMuted = false; // by who looks at this page
-  const sounds = { voice: { state: "off" }, microphone: { state: "off" } }; // as they were shown last, and since when
+  let isSeen = false; // by the camera
+  const sounds = { voice: { state: "off" }, microphone: { state: "off" }, camera: { state: "off" } }; // as they were shown last, and since when
   const paint = (made, name) => {
     made.innerHTML = ICONS[name];
     return made;
@@ -83,7 +86,8 @@ export function bar({ top, bottom, order, turn, session, examples, spoken }) {
   hold.addEventListener("contextmenu", (event) => event.preventDefault());
   const words = element("input", { type: "text", maxlength: "400", autocomplete: "off", enterkeyhint: "send" });
   const send = element("button", { type: "submit", class: "send" }, drawing("send"));
-  const form = element("form", { class: "say" }, hold, words, send);
+  const see = button("see", () => eye.press(), drawing("eye"));
+  const form = element("form", { class: "say" }, hold, see, words, send);
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     if (words.value.trim()) order({ do: "type", text: words.value.trim() });
@@ -119,8 +123,19 @@ export function bar({ top, bottom, order, turn, session, examples, spoken }) {
   });
   // Who was seated as the page was loaded anew hears the robot from their first press on.
   const soundsAgain = ({ target }) => !loud.contains(target) && sounds.voice.state === "off" && robot.press();
+  const eye = camera(session, { show: shows("camera"), level(value) {
+    isSeen = value > 0;
+    see.style.setProperty("--loud", 0.3 * value);
+  } });
   function draw() {
     if (!text) return;
+    const seen = sounds.camera.state;
+    see.setAttribute("aria-label", text.camera[seen]);
+    see.title = text.camera[seen];
+    see.setAttribute("aria-pressed", String(seen !== "off"));
+    see.classList.toggle("light", seen === "on");
+    see.classList.toggle("asks", seen === "asked");
+    see.hidden = !last?.person || !(last.sees || seen !== "off");
     const [isLoud, heard] = [sounds.voice.state === "on", sounds.microphone.state];
     if (loud.getAttribute("aria-pressed") !== String(isLoud)) paint(loud.firstChild, isLoud ? "loud" : "mute");
     loud.setAttribute("aria-pressed", String(isLoud));
@@ -156,8 +171,8 @@ export function bar({ top, bottom, order, turn, session, examples, spoken }) {
       for (const [made, name] of [[nod, "nod"], [point, "point"], [leave, "leave"]]) made.lastChild.textContent = text[name];
       draw();
     },
-    // person: id of who looks; empty: no seat. ready: the robot can be talked with. company: ids of others. hears: the
-    // robot hears people.
+    // person: id of who looks; empty: no seat. ready: the robot can be talked with. company: ids of others. hears, sees: the
+    // robot hears people, and sees them.
     take(state) {
       const was = last?.person;
       if (!last && state.person) addEventListener("click", soundsAgain, { capture: true, once: true });
@@ -167,6 +182,7 @@ export function bar({ top, bottom, order, turn, session, examples, spoken }) {
       if (was && !state.person) {
         isSpeaking = false;
         ear.off();
+        eye.off();
         point.setAttribute("aria-pressed", "false");
       }
       const hadFocus = (state.person ? away : here).contains(document.activeElement);
@@ -193,6 +209,9 @@ export function bar({ top, bottom, order, turn, session, examples, spoken }) {
     pointed() {
       point.setAttribute("aria-pressed", "false");
     },
+    get isSeen() {
+      return isSeen;
+    },
     get isSpeaking() {
       return isSpeaking;
     },
@@ -201,10 +220,15 @@ export function bar({ top, bottom, order, turn, session, examples, spoken }) {
       const { state, isLacking } = sounds.microphone;
       return !last?.hears ? "none" : state === "on" ? "on" : isLacking ? "lacking" : "off";
     },
-    // What is wrong with microphone or voice, in words; empty: nothing.
+    // The camera, in the same words.
+    get eye() {
+      const { state, isLacking } = sounds.camera;
+      return !last?.sees ? "none" : state === "on" ? "on" : isLacking ? "lacking" : "off";
+    },
+    // What is wrong with microphone, camera or voice, in words; empty: nothing.
     get trouble() {
-      const told = Object.values(sounds).filter((each) => each.news && (each.state !== "off" || performance.now() - each.since < STAYS));
-      return told.map((each) => each.news(text.sound)).find(Boolean) ?? "";
+      const told = Object.entries(sounds).filter(([, each]) => each.news && (each.state !== "off" || performance.now() - each.since < STAYS));
+      return told.map(([name, each]) => each.news(name === "camera" ? text.seen : text.sound)).find(Boolean) ?? "";
     },
   };
 }

@@ -81,7 +81,7 @@ function tell() {
   const present = scene?.people.filter((each) => each.at && each.present && each.id !== person) ?? [];
   bar.take({
     person, denied: state.denied, ready: talk?.state === "ready" && !state.link && Boolean(scene?.body), company: present.map(({ id }) => id),
-    measure: talk?.levels.find(({ actor }) => actor === person), speaks: isTalking(), hears: talk?.hears,
+    measure: talk?.levels.find(({ actor }) => actor === person), speaks: isTalking(), hears: talk?.hears, sees: talk?.sees,
   });
   document.body.classList.toggle("seated", Boolean(person));
   if (shown && scene) shown.take(scene, person);
@@ -178,7 +178,7 @@ function hint(now) {
   const named = (id) => state.scene.things.find((each) => each.id === id)?.label ?? text.called(id);
   const met = moment(talk, state.scene.robot, person);
   const next = visit(now - idle, { seated: true, kiosk: isKiosk, touched });
-  const tips = text.tips(bar.ear);
+  const tips = text.tips(bar.ear, bar.eye);
   if (next.do === "tip" && !["looking", "elsewhere"].includes(met?.text)) return tips[next.number % tips.length];
   if (met?.text === "looking" && ["off", "lacking"].includes(bar.ear)) return tips[0];
   if (met) return typeof text[met.text] === "function" ? text[met.text](named(met.about)) : text[met.text];
@@ -190,7 +190,7 @@ let last = 0;
 function tick() {
   requestAnimationFrame(tick);
   const now = clock();
-  if (isTalking()) idle = now;
+  if (isTalking() || bar.isSeen) idle = now;
   const next = visit(now - idle, { seated: Boolean(state.person), kiosk: isKiosk, touched });
   if (next.do === "anew") {
     touched = false;

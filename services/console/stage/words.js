@@ -1,4 +1,5 @@
 // All words of the stage in each of its languages. What robot and people say stays as they say it.
+import { CAMERA_WORDS } from "../page/camera-words.js";
 import { SOUND_WORDS } from "../page/sound-words.js";
 
 const ENGLISH = {
@@ -16,6 +17,7 @@ const ENGLISH = {
   visitor: "Visitor",
   hold: "Hold to talk",
   microphone: { off: "Microphone: press to talk", asked: "Microphone: ask no more", on: "Microphone is on: switch it off" },
+  camera: { off: "Camera: let the robot see where you look", asked: "Camera: ask no more", on: "Camera is on: switch it off" },
   loud: "The robot's voice",
   talks: "You are talking…",
   type: "Say something",
@@ -39,8 +41,9 @@ const ENGLISH = {
   meet: "The robot looks at you. Touch its face to look back.",
   listen: "The robot is speaking to you.",
   elsewhere: (name) => `The robot is speaking to ${name}.`,
-  tips: (ear) => [
+  tips: (ear, eye) => [
     ...({ on: ["Just talk: the robot hears you."], off: ["Press the microphone, and talk."], lacking: ["Type what you want to say."] }[ear] ?? []),
+    ...({ on: ["The robot sees where you look. For a piece, touch it."], off: ["Press the camera, and the robot sees where you look."] }[eye] ?? []),
     "Touch a piece to look at it.", "Drag a piece to move it.", ...(ear === "none" ? ["Hold the round button, and talk."] : []), "Choose Point, and touch a piece.",
   ],
   pointing: "Touch what you point at.",
@@ -58,6 +61,7 @@ const ENGLISH = {
   stay: "I am here",
   flat: "This browser shows no 3D. Words and buttons work all the same.",
   sound: { late: "", plain: "this page came by http, and browsers want https for it. Ask who looks after the robot" },
+  seen: { models: "what finds faces is not installed here. Ask who looks after the robot" },
 };
 const GERMAN = {
   title: "Setz dich vor den Roboter und sprich mit ihm",
@@ -74,6 +78,7 @@ const GERMAN = {
   visitor: "Gast",
   hold: "Halten und sprechen",
   microphone: { off: "Mikrofon: drücken und sprechen", asked: "Mikrofon: nicht mehr fragen", on: "Mikrofon ist an: ausschalten" },
+  camera: { off: "Kamera: der Roboter sieht, wohin du schaust", asked: "Kamera: nicht mehr fragen", on: "Kamera ist an: ausschalten" },
   loud: "Die Stimme des Roboters",
   talks: "Du sprichst…",
   type: "Sag etwas",
@@ -97,8 +102,9 @@ const GERMAN = {
   meet: "Der Roboter schaut dich an. Berühre sein Gesicht, um zurückzuschauen.",
   listen: "Der Roboter spricht mit dir.",
   elsewhere: (name) => `Der Roboter spricht mit ${name}.`,
-  tips: (ear) => [
+  tips: (ear, eye) => [
     ...({ on: ["Sprich einfach: der Roboter hört dich."], off: ["Drück auf das Mikrofon, und sprich."], lacking: ["Schreib, was du sagen willst."] }[ear] ?? []),
+    ...({ on: ["Der Roboter sieht, wohin du schaust. Ein Teil berührst du."], off: ["Drück auf die Kamera, und der Roboter sieht, wohin du schaust."] }[eye] ?? []),
     "Berühre ein Teil, um es anzusehen.", "Zieh ein Teil, um es zu bewegen.", ...(ear === "none" ? ["Halte den runden Knopf, und sprich."] : []), "Wähle Zeigen, und berühre ein Teil.",
   ],
   pointing: "Berühre, worauf du zeigst.",
@@ -116,6 +122,7 @@ const GERMAN = {
   stay: "Ich bin da",
   flat: "Dieser Browser zeigt kein 3D. Worte und Knöpfe gehen trotzdem.",
   sound: { late: "", plain: "diese Seite kam über http, und Browser wollen dafür https. Frag, wer sich um den Roboter kümmert" },
+  seen: { models: "was Gesichter findet, ist hier nicht installiert. Frag, wer sich um den Roboter kümmert" },
 };
 const ALL = { en: ENGLISH, de: GERMAN };
 
@@ -124,7 +131,7 @@ const NAMELESS = /^visitor(-\d+)?$/; // ids of who sat down without a name (seat
 export function language(wanted) {
   return wanted.map((each) => each.slice(0, 2).toLowerCase()).find((each) => each in ALL) ?? "en";
 }
-// Of the sound a visitor is told in other words what only the robot's host can mend, and nothing of what passes.
+// Of sound and camera a visitor is told in other words what only the robot's host can mend, and nothing of what passes.
 // spoken: the language of the robot, as a tag. What is typed at one touch is in that one.
 export function texts(name, spoken) {
   const own = ALL[name];
@@ -140,6 +147,7 @@ export function texts(name, spoken) {
     type: isOther ? own.typing(called) : own.type,
     quick: own.quick.map(([label, , how], index) => [label, ALL[language([spoken])].quick[index][1], how]),
     sound: { ...SOUND_WORDS[name], ...own.sound },
+    seen: { ...CAMERA_WORDS[name], plain: own.sound.plain, ...own.seen },
   };
 }
 export const another = (name) => (name === "de" ? "en" : "de");

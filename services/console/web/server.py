@@ -33,6 +33,7 @@ from engage_hri.services.console.web.guard import App, Guarded, Hosts
 from engage_hri.services.console.web.played import PlayedPicture
 from engage_hri.services.console.web.service import WindowServer
 from engage_hri.services.console.web.sessions import OVER, PageSession, Sessions
+from engage_hri.services.console.web.sights import Sights
 from engage_hri.services.console.web.sounds import Sounds
 from engage_hri.services.console.web.stage import StageFace
 from engage_hri.services.console.web.visitor import Visitor
@@ -129,6 +130,7 @@ def application(
         WebSocketRoute(MESSAGES, messages),
         WebSocketRoute("/voice", sounds.voice),
         WebSocketRoute("/microphone", sounds.microphone),
+        *Sights(window.bus, visitor).routes(PAGE),
         Route("/stage", _page(STAGE, window.bus.robot, visitors, language, examples)),
         WebSocketRoute(STAGE_FRAMES, shows(stage, visitors)),
         Mount("/stage", _Fresh(directory=STAGE)),
@@ -191,11 +193,11 @@ def _app(
 
     (nicegui,) = find_spec("nicegui").submodule_search_locations  # type: ignore[union-attr,misc]
     routes = [
+        *more,
         Route("/", _page(PAGE, robot, token)),
         Mount("/page", _Fresh(directory=PAGE)),
         Mount("/three", StaticFiles(directory=Path(nicegui) / THREE)),
         WebSocketRoute(FRAMES, frames),
-        *more,
     ]
     return Starlette(routes=routes, lifespan=life)
 

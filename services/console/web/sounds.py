@@ -9,24 +9,17 @@ per second as well (uint32), and then the samples, 16 bit, one channel; all of i
 
 import asyncio
 import struct
-from collections.abc import Callable, Coroutine
 from math import isfinite
-from typing import Any
 
-import msgspec
-from msgspec import Struct
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.sound import SoundFrame
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Received
-from engage_hri.services.console.web.visitor import Visitor
+from engage_hri.services.console.web.links import NONSENSE, NOT_YOURS, TOO_MUCH, PageLinks
 from engage_hri.services.runtime.installation import extra_command, has_hearing
 
-MOST_SOUNDS = 100
-"""Pages that may play the voice at once, and microphones."""
 WAITING = 64
 """Frames of the voice that wait for a page that takes none: some 6 s. The oldest go."""
 RATE = 16_000
@@ -37,30 +30,8 @@ BURST: Seconds = 3.0
 """So much more sound than time has passed a page may send: what its link has kept back."""
 LATEST: Seconds = 10.0
 """Age from which on sound of a microphone is of no use."""
-NOT_YOURS = 4403
-"""Code with which a link is closed to which a page has no right, or no more."""
-TOO_MUCH = 4408
-"""Code with which a link is closed whose page sends more sound than there is time."""
-NONSENSE = 1003
-"""Code of RFC 6455 with which a link is closed that sends what is no sound."""
-ROOM = 4429
-"""Code with which a link is closed for which there is no room."""
 _TO_PAGE = struct.Struct("<dII")
 _FROM_PAGE = struct.Struct("<dI")
-
-
-class AskedTime(Struct, frozen=True):
-    """Question of a page for the time. asked: by its own clock, seconds."""
-
-    asked: float
-
-
-class ToldTime(Struct, frozen=True, omit_defaults=True):
-    """Answer to `AskedTime`. now: by the window's clock, seconds. unheard: why nobody hears this microphone."""
-
-    asked: float
-    now: Seconds
-    unheard: str = ""
 
 
 def unheard(bus: Bus, key: str) -> str:
@@ -73,15 +44,8 @@ def unheard(bus: Bus, key: str) -> str:
     return f"hearing does not run: {advice}"
 
 
-_asked = msgspec.json.Decoder(AskedTime)
-
-
-class Sounds:
-    """The links of all pages for sound. bus: the window's. visitor: finds the one at a page by its session."""
-
-    def __init__(self, bus: Bus, visitor: Callable[[str], Visitor | None]) -> None:
-        self._bus, self._visitor = bus, visitor
-        self._links = 0
+class Sounds(PageLinks):
+    """The links of all pages for sound."""
 
     async def voice(self, page: WebSocket) -> None:
         """Let a page play the robot's voice, until it goes."""
@@ -90,21 +54,6 @@ class Sounds:
     async def microphone(self, page: WebSocket) -> None:
         """Publish the sound of a page's microphone as that of the person at it, until one of them goes."""
         await self._linked(page, self._listen)
-
-    async def _linked(self, page: WebSocket, serve: Callable[[WebSocket], Coroutine[Any, Any, None]]) -> None:
-        await page.accept()  # who is refused before learns no reason
-        if self._links >= MOST_SOUNDS:
-            await page.close(ROOM, f"{MOST_SOUNDS} pages have sound already")
-            return
-        self._links += 1
-        try:
-            await serve(page)
-        except WebSocketDisconnect:
-            pass
-        except InputRefused as error:
-            await page.close(NOT_YOURS, str(error)[:120])
-        finally:
-            self._links -= 1
 
     # -- the robot's voice ----------------------------------------------------------------------------------------
 
@@ -133,15 +82,14 @@ class Sounds:
     # -- microphones ----------------------------------------------------------------------------------------------
 
     async def _listen(self, page: WebSocket) -> None:
-        visitor = self._visitor(page.query_params.get("session", ""))
-        person = visitor.person if visitor is not None else ""
-        if visitor is None or not person:
-            await page.close(NOT_YOURS, "take a seat first: a microphone is that of a person")
+        visitor = await self._seated(page, "a microphone")
+        if visitor is None:
             return
+        person = visitor.person
         key, numbers, begun, got = keys.sound(person), 0, self._bus.now(), 0.0
         try:
             while True:
-                content = await self._received(page, key)
+                content = await self._received(page, lambda: unheard(self._bus, key))
                 if visitor.person != person:
                     await page.close(NOT_YOURS, "you have left your seat")
                     return
@@ -169,24 +117,3 @@ class Sounds:
             return None
         at = min(at, self._bus.now() - size / 2 / RATE)
         return SoundFrame(at=self._bus.stamp(at), rate=RATE, number=number, samples=content[_FROM_PAGE.size :])
-
-    # -- links ----------------------------------------------------------------------------------------------------
-
-    async def _received(self, page: WebSocket, key: str = "") -> bytes:
-        """Wait for sound, and tell the time meanwhile, and if nobody hears what is sent on `key`.
-
-        Raises WebSocketDisconnect, after nonsense as well.
-        """
-        while True:
-            message = await page.receive()
-            if message["type"] == "websocket.disconnect":
-                raise WebSocketDisconnect(message["code"])
-            if (content := message.get("bytes")) is not None:
-                return bytes(content)
-            try:
-                asked = _asked.decode(message.get("text") or "")
-            except (msgspec.DecodeError, RecursionError):
-                await page.close(NONSENSE, "this is no question for the time")
-                raise WebSocketDisconnect(NONSENSE) from None
-            told = ToldTime(asked.asked, self._bus.now(), unheard(self._bus, key) if key else "")
-            await page.send_text(msgspec.json.encode(told).decode())

@@ -18,6 +18,8 @@ from engage_hri.services.console.web.seats import SIMULATION, TASK
 
 HEARING = "hearing"
 """Service that hears people."""
+EYES = "eyes"
+"""Service that sees people."""
 BUBBLES = 6
 """Turns that are told at most, the newest."""
 Readiness = Literal["ready", "held", "away"]
@@ -61,7 +63,7 @@ class LevelShown(Struct, frozen=True):
 class StageTalk(Struct, frozen=True):
     """All of the stage but what has a place in space. played: people that a program plays.
 
-    task: the robot does its task with whoever comes first. hears: it hears people.
+    task: the robot does its task with whoever comes first. hears, sees: it hears people, and sees them.
     """
 
     state: Readiness
@@ -72,6 +74,7 @@ class StageTalk(Struct, frozen=True):
     played: tuple[str, ...]
     task: bool
     hears: bool
+    sees: bool
 
 
 def talk(
@@ -104,6 +107,7 @@ def talk(
         played=tuple(person for person, reporter in reporters.items() if reporter == SIMULATION),
         task=here.get(TASK, False),
         hears=here.get(HEARING, False),
+        sees=here.get(EYES, False),
     )  # fmt: skip
 
 

@@ -1,8 +1,8 @@
 """Visitors: each is somebody at a browser, whose orders are carried out here."""
 
 import asyncio
-from collections.abc import AsyncIterator, Coroutine
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Coroutine, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from functools import partial
 from itertools import count
 from typing import Any
@@ -21,6 +21,7 @@ from engage_hri.services.client.people.perceived_person import PerceivedPerson, 
 from engage_hri.services.console.web import orders
 from engage_hri.services.console.web.frames import Receipts, Viewer, You
 from engage_hri.services.console.web.orders import Panel
+from engage_hri.services.console.web.own_look import OwnLook
 from engage_hri.services.console.web.scene import laid
 from engage_hri.services.console.web.seats import SETTLED, Invitation
 from engage_hri.services.console.web.service import WindowServer
@@ -48,6 +49,8 @@ class Visitor:
         self._denied = orders.denied(window.bus.role, trusted, keyed=window.keyed, stage=stage is not None)
         self._tasks: set[asyncio.Task[None]] = set()
         self._person: PerceivedPerson | None = None
+        self._look: OwnLook
+        """Of that person, or of the last one; only a seat gives one."""
         self._sitting: asyncio.Task[None] | None = None
         self._stands_up = asyncio.Event()
         self._lets_go = asyncio.Event()
@@ -58,6 +61,15 @@ class Visitor:
     def person(self) -> str:
         """Id of the person that they are; empty: none."""
         return self._person.id if self._person else ""
+
+    @contextmanager
+    def seen(self) -> Iterator[OwnLook]:
+        """Let a camera see them, who have a seat, while the body of `with` runs. Gives what is to be told of that."""
+        look = self._look
+        try:
+            yield look
+        finally:
+            look.unseen()
 
     @property
     def you(self) -> You:
@@ -120,7 +132,7 @@ class Visitor:
             case orders.LeaveOrder():
                 self._stands_up.set()
             case orders.LookOrder(target=target):
-                self._person.begin("look", target)
+                self._look.at(target)
             case orders.PointAt(target=target):
                 self._begin(self._person.point_at(target))
             case orders.MoveHead(how=how):
@@ -136,9 +148,12 @@ class Visitor:
         async with self._seat(wanted) as (name, position):
             try:
                 async with perceive(name, hub=self._window.hub, position=position) as person:
-                    self._person = person
-                    person.begin("look", self._window.bus.robot)
-                    await self._stands_up.wait()
+                    look = OwnLook(person, self._window.bus.robot, position)
+                    self._person, self._look = person, look
+                    try:
+                        await self._stands_up.wait()
+                    finally:
+                        look.close()
             finally:
                 self._person = None
 
@@ -172,7 +187,7 @@ class Visitor:
             raise InputRefused(Fault(reason=f"{thing!r} is nothing that can be moved", where=person.id))
 
         async def act() -> None:
-            person.begin("look", thing)
+            self._look.at(thing)
             await person.act(thing, to=there.position, seconds=REACH)
             now = next((each for each in person.world if each.id == thing), there)
             if now.yaw != there.yaw:

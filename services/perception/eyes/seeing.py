@@ -13,7 +13,7 @@ import numpy as np
 
 from engage_hri.schemas.landmarks import FaceLandmarks
 from engage_hri.schemas.units import Meters, Radians, Seconds, Vector
-from engage_hri.services.perception.eyes.camera import StatedCamera
+from engage_hri.services.perception.eyes.camera import SeatCamera, StatedCamera
 from engage_hri.services.perception.eyes.config import EyesConfig
 from engage_hri.services.perception.eyes.head_pose import direction, head, yaw_pitch
 from engage_hri.services.perception.eyes.looking import unpacked
@@ -77,10 +77,10 @@ class _Known:
 
 
 class Seeing:
-    """The people before one camera."""
+    """The people before one camera. camera: None: where the settings say that it stands."""
 
-    def __init__(self, config: EyesConfig) -> None:
-        self._camera = StatedCamera(config.field_of_view, config.place, config.tilt, config.pan)
+    def __init__(self, config: EyesConfig, camera: StatedCamera | SeatCamera | None = None) -> None:
+        self._camera = camera or StatedCamera(config.field_of_view, config.place, config.tilt, config.pan)
         self._tracker = FaceTracker()
         self._known: dict[str, _Known] = {}
         self._at = float("-inf")
@@ -103,6 +103,11 @@ class Seeing:
         for face in here:
             told += self._seen(face)
         return told
+
+    @property
+    def follows(self) -> bool:
+        """True while a face is followed, seen in the last picture or not."""
+        return self._tracker.follows
 
     def end(self) -> list[Seen]:
         """Let all go: nobody looks any more."""

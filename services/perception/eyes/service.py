@@ -4,8 +4,8 @@ Each is told with the instant at which the picture was taken. Who is seen is a p
 on the bus as well, so that a recording can be perceived once more with other settings.
 """
 
-import math
 import time
+from collections.abc import Awaitable, Callable
 from contextlib import aclosing
 
 from msgspec.structs import replace
@@ -14,17 +14,14 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.landmarks import FaceLandmarks
 from engage_hri.schemas.participants import PeerAlive
-from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose
-from engage_hri.schemas.units import Meters, Seconds, Vector
-from engage_hri.schemas.world import Entity, World
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus import journal
-from engage_hri.services.bus.interface import Bus, Received, Subscription
-from engage_hri.services.client.people.perceived_person import PerceivedActions
-from engage_hri.services.client.people.shared_world import SharedWorld
-from engage_hri.services.perception.eyes.config import EyesConfig
+from engage_hri.services.bus.interface import Bus, Subscription
+from engage_hri.services.perception.eyes.config import PAGE, EyesConfig
 from engage_hri.services.perception.eyes.looking import settings_of
-from engage_hri.services.perception.eyes.packages import data_folder
-from engage_hri.services.perception.eyes.seeing import PersonCame, PersonGesture, PersonGone, Seeing, Seen, SeenHead
+from engage_hri.services.perception.eyes.pages import PageEyes
+from engage_hri.services.perception.eyes.people import SeenPeople
+from engage_hri.services.perception.eyes.seeing import Seeing
 from engage_hri.services.perception.eyes.watching import (
     InsideWatching,
     OutsideWatching,
@@ -32,6 +29,7 @@ from engage_hri.services.perception.eyes.watching import (
     SourceOrder,
     Watching,
 )
+from engage_hri.services.runtime.packages import data_folder
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 
@@ -39,8 +37,6 @@ LOOK_AROUND: Seconds = 0.5
 """Time in which the world, if anybody tells it, is known."""
 AGAIN: Seconds = 2.0
 """Time after which a device is tried again that gave no picture."""
-MOVED: Meters = 0.05
-"""Distance from which on a face is at another place of the world; heads are told where they are each time."""
 
 
 async def see(bus: Bus, ready: Ready, config: EyesConfig) -> None:
@@ -50,71 +46,64 @@ async def see(bus: Bus, ready: Ready, config: EyesConfig) -> None:
 
     Raises InputRefused: there is no such source, or a package or a model is not installed.
     """
-    with bus.subscribe(keys.ANY_ROBOT_ALIVE, keys.WORLD) as inbox:
+    has_pages = config.source == PAGE
+    landmarks = (keys.ANY_LANDMARKS,) if has_pages else ()
+    with bus.subscribe(keys.ANY_ROBOT_ALIVE, keys.WORLD, *landmarks) as inbox:
         tell_settings(bus, "eyes", config)
-        eyes = _Eyes(bus, config, inbox)
+        people = SeenPeople(bus, brings=not has_pages)
+        eyes = PageEyes(bus, config, inbox, people) if has_pages else _Eyes(bus, config, inbox, people)
+        is_ready = False
+
+        async def begin() -> None:
+            nonlocal is_ready
+            if not is_ready:
+                is_ready = True
+                ready()
+                await _recognition(bus, inbox, people)
+
         try:
-            await eyes.watch(ready)
+            await eyes.watch(begin)
         finally:
             eyes.close()
 
 
 class _Eyes:
-    """State of the service."""
+    """Sees what a source tells, and tells it of people."""
 
-    def __init__(self, bus: Bus, config: EyesConfig, inbox: Subscription) -> None:
-        self._bus, self._inbox = bus, inbox
-        self._name = config.source.partition(":")[0]
-        order = SourceOrder(self._name, settings_of(config, str(data_folder())))
+    def __init__(self, bus: Bus, config: EyesConfig, inbox: Subscription, people: SeenPeople) -> None:
+        self._bus, self._inbox, self._people = bus, inbox, people
+        order = SourceOrder(config.source.partition(":")[0], settings_of(config, str(data_folder())))
         is_real = abs(bus.now() - time.monotonic()) < 1.0
         self._watching: Watching = OutsideWatching(order) if is_real else InsideWatching(order)
-        self._config, self._seeing = config, Seeing(config)
-        self._world, self._perceived = SharedWorld(bus.name), PerceivedActions(bus)
-        self._own: dict[str, Entity] = {}
-        """The people whom this service has brought into the world."""
+        self._seeing = Seeing(config)
         self._is_lost = False
         """No picture comes from the device, which was told."""
 
-    async def _wait_for_recognition(self) -> None:
-        """Wait until recognition is there, and for the world."""
-        deadline = None
-        while (received := await self._inbox.next(deadline)) is not None:
-            self._take(received)
-            match received.message:
-                case PeerAlive(participant="recognition"):
-                    deadline = self._bus.now() + LOOK_AROUND
-
-    async def watch(self, ready: Ready) -> None:
+    async def watch(self, begin: Callable[[], Awaitable[None]]) -> None:
         """See all that the source tells; what a device does not give is told, and it is tried again.
 
-        ready: called when the source is open, or is a device that will be tried again.
+        begin: awaited when the source is open, or is a device that will be tried again.
         """
-        is_ready = False
         while True:
             try:
                 async with aclosing(self._watching.watch()) as told:
                     async for landmarks in told:
-                        if not is_ready:
-                            is_ready = True
-                            ready()
-                            await self._wait_for_recognition()
-                        self._catch_up()
+                        await begin()
+                        while (received := self._inbox.take()) is not None:
+                            self._people.take(received)
                         if landmarks is not None:
                             self._see(landmarks)
                 return
             except SourceLost as lost:
                 self._lose(lost.fault)
-            if not is_ready:
-                is_ready = True
-                ready()
-                await self._wait_for_recognition()
+            await begin()
             until = self._bus.now() + AGAIN
             while (received := await self._inbox.next(until)) is not None:
-                self._take(received)
+                self._people.take(received)
 
     def close(self) -> None:
         """Let all leave who were seen."""
-        self._tell(self._seeing.end())
+        self._people.tell(self._seeing.end(), self._bus.now())
 
     def _see(self, landmarks: FaceLandmarks) -> None:
         if self._is_lost:
@@ -122,32 +111,7 @@ class _Eyes:
             journal.alert(self._bus.log, "seeing again")
         at = landmarks.at.seconds
         self._bus.publish(keys.landmarks(self._bus.name), replace(landmarks, at=self._bus.stamp(at)))
-        self._tell(self._seeing.feed(landmarks, at), at)
-
-    def _tell(self, seen: list[Seen], at: Seconds = 0.0) -> None:
-        """Tell what is new. at: of the picture."""
-        for each in seen:
-            match each:
-                case PersonCame(person, place, since):
-                    self._bring(person, place)
-                    self._perceived.tell(ActorFound(actor=person, at=self._bus.stamp(since)))
-                case PersonGone(person, since):
-                    del self._own[person]
-                    self._show()
-                    self._perceived.tell(ActorLost(actor=person, at=self._bus.stamp(since)))
-                case PersonGesture(person, change):
-                    kind = ActionBegan if change.began else ActionEnded
-                    self._perceived.tell(kind(actor=person, action=change.gesture, at=self._bus.stamp(change.at)))
-                case SeenHead(person, place, direction, (yaw, pitch), mouth):
-                    if math.dist(place, self._own[person].position) > MOVED:
-                        self._bring(person, place)
-                    self._bus.publish(
-                        keys.head_pose(person),
-                        HeadPose(
-                            actor=person, position=place, direction=direction, at=self._bus.stamp(at),
-                            yaw_spread=yaw, pitch_spread=pitch, mouth=mouth,
-                        ),
-                    )  # fmt: skip
+        self._people.tell(self._seeing.feed(landmarks, at), at)
 
     def _lose(self, fault: Fault) -> None:
         if not self._is_lost:
@@ -155,23 +119,12 @@ class _Eyes:
             journal.alert(self._bus.log, "%s", fault)
             self._bus.publish(keys.fault(self._bus.name), replace(fault, service=self._bus.name))
 
-    # -- the world ----------------------------------------------------------------------------------------------
 
-    def _catch_up(self) -> None:
-        """Take what others have told meanwhile."""
-        while (received := self._inbox.take()) is not None:
-            self._take(received)
-
-    def _take(self, received: Received) -> None:
-        """Take what others tell of the world, and of who is there."""
-        with self._bus.containing(received):
-            if self._world.take(received.message, received.source, self._bus.now()) and self._own:
-                self._show()
-
-    def _bring(self, person: str, place: Vector) -> None:
-        self._own[person] = Entity(id=person, kind="person", position=place)
-        self._show()
-
-    def _show(self) -> None:
-        entities = self._world.tell(self._own.values(), self._bus.now())
-        self._bus.publish(keys.WORLD, World(entities=entities, at=self._bus.stamp()))
+async def _recognition(bus: Bus, inbox: Subscription, people: SeenPeople) -> None:
+    """Wait until recognition is there, and for the world."""
+    deadline = None
+    while (received := await inbox.next(deadline)) is not None:
+        people.take(received)
+        match received.message:
+            case PeerAlive(participant="recognition"):
+                deadline = bus.now() + LOOK_AROUND

@@ -65,6 +65,11 @@ class FaceTracker:
         """All who are somebody, seen or not."""
         return [face for face in self._faces if face.id]
 
+    @property
+    def follows(self) -> bool:
+        """True while there is a face that may come back as the same."""
+        return bool(self._faces)
+
     def feed(self, heads: Sequence[MeasuredHead], at: Seconds) -> tuple[list[TrackedFace], list[TrackedFace]]:
         """Take the heads of the next picture. Returns who is seen in it, and who has gone for good."""
         past = 0.0 if self._at is None else at - self._at

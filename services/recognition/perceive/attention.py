@@ -5,8 +5,10 @@
     actions = attention.advance(now)                # whenever `attention.deadline` has been reached
 
 A symbolic report of an action has precedence: from the first one on, raw perception of that action of that person is
-ignored, as long as the `Attention` lives. Actions carry the times at which they began and ended, though they are
-known only later; until then `undecided` says from when on.
+ignored, as long as the `Attention` lives. A look is always at something, if only away: so where none goes on for
+`FACE_GRACE`, nobody reports looks any more, and heads count again, as of who played a person by hand and now lets a
+camera see them. Actions carry the times at which they began and ended, though they are known only later; until then
+`undecided` says from when on.
 
 How much a head attends to the robot is a matter of degree, and of the person: see `attending.py`.
 """
@@ -49,6 +51,8 @@ class _Actor:
         """True while the face is found and not lost since."""
         self.reported: set[Action] = set()
         """Actions that perception reports itself."""
+        self.look_ended = NEVER
+        """Time at which the last look that perception reported has ended; infinite: one goes on."""
         self.presence_reported = False
         self.attending = Attending()
         self.to_robot: Probability | None = None
@@ -143,6 +147,7 @@ class Attention:
             case ActionBegan() | ActionEnded():
                 actor.reported.add(report.action)
                 if report.action == "look":
+                    actor.look_ended = at if isinstance(report, ActionEnded) else float("inf")
                     self._attends(actor, None)
             case ActorFound():
                 actor.presence_reported = True
@@ -232,6 +237,8 @@ class Attention:
         actor.seen, actor.posed_at = True, at
         actor.alive_at = max(actor.alive_at, at)
         self._gaze_targets.see_face(actor.id, pose.position, at)
+        if at > actor.look_ended + FACE_GRACE:
+            actor.reported.discard("look")
         if "look" in actor.reported:
             return actions
         gaze, present = (pose.position, pose.direction), actor.looking.nearest

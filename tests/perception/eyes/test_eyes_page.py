@@ -8,9 +8,9 @@ from pathlib import Path
 from engage_hri.services.commandline.shell.roster import group
 from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.perception.eyes.looking import SourceSettings
-from engage_hri.services.perception.eyes.packages import FACE_MODELS
 from engage_hri.services.runtime.configuration import read
 from engage_hri.services.runtime.installation import LANDMARKS, offers
+from engage_hri.services.runtime.parcels import FACE_MODELS
 
 PAGE = (Path(__file__).resolve().parents[3] / "docs" / "eyes.md").read_text(encoding="utf-8")
 

@@ -11,7 +11,7 @@ import pytest
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.perception.eyes.head_pose import head, yaw_pitch
 from engage_hri.services.perception.eyes.looking import SourceSettings, unpacked
-from engage_hri.services.perception.eyes.packages import DETECTOR
+from engage_hri.services.runtime.parcels import DETECTOR
 from tests.perception.eyes.fetched import MODELS, needs_eyes
 from tests.perception.eyes.people import (
     CAMERA,

@@ -8,7 +8,7 @@ import { measures } from "./measures.js";
 import { part } from "./part.js";
 import { wizard } from "./wizard.js";
 import { player } from "./player.js";
-import { microphonePart, voicePart } from "./sound.js";
+import { cameraPart, microphonePart, voicePart } from "./sound.js";
 import { away, head, health, notes, references, switched, words } from "./lists.js";
 
 const EACH = { "block/": "blocks", "net/": "layouts", "measures/": "measures" }; // sections that there are several of
@@ -24,7 +24,7 @@ export function begin(root, robot) {
   const state = { robot, blocks: new Map(), layouts: new Map(), measures: new Map(), now: () => 0, away: "" };
   const order = (what) => link.send(what);
   const drawn = [
-    space(at("scene"), order), map(at("above"), order), part(at("part"), order), microphonePart(at("part"), () => link.session), wizard(at("wizard"), order), words(at("said")), voicePart(at("said")), head(at("head")), floorLanes(at("floor")), eventLanes(at("events")),
+    space(at("scene"), order), map(at("above"), order), part(at("part"), order), microphonePart(at("part"), () => link.session), cameraPart(at("part"), () => link.session), wizard(at("wizard"), order), words(at("said")), voicePart(at("said")), head(at("head")), floorLanes(at("floor")), eventLanes(at("events")),
     behaviorLanes(at("behaviors")), net(at("net")), measures(at("measures")), references(at("references")),
     health(at("health")), notes(at("notes")), switched(root.querySelector(".switched")),
     player(root.querySelector(".player"), order),

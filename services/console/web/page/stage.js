@@ -15,7 +15,7 @@ const MAIN = [
   ["notes", "Warnings and news", `<ul class="notes" role="log" aria-live="polite" aria-labelledby="notes-title" tabindex="0"></ul>`],
 ];
 const SIDE = [
-  ["part", "You", `<div class="part"></div><div class="microphone row"></div><p class="told" role="status"></p>`],
+  ["part", "You", `<div class="part"></div><div class="microphone row"></div><div class="camera row"></div><p class="told" role="status"></p>`],
   ["said", "Words", `<div class="sound row"></div><ol class="words" aria-labelledby="said-title" tabindex="0"></ol><div class="unseen" role="log" aria-label="What was said just now"></div>`],
   ["wizard", "The robot by hand", `<div class="wizard"></div><p class="told" role="status"></p>`],
   ["head", "Where the robot looks, and why", `<div class="head"></div>`],

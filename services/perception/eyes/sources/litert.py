@@ -17,7 +17,7 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.landmarks import FACE_POINTS
 from engage_hri.schemas.units import Probability
 from engage_hri.services.perception.eyes.looking import Floats, missing
-from engage_hri.services.perception.eyes.packages import DETECTOR, MESH
+from engage_hri.services.runtime.parcels import DETECTOR, MESH
 
 Image = NDArray[np.uint8]
 """Rows of pixels, red, green and blue."""

@@ -25,7 +25,7 @@ class RecordedSource(LandmarkSource):
             raise missing("record", error) from error
         told: dict[str, list[tuple[Seconds, FaceLandmarks]]] = {}
         for received, at in messages(read(Path(settings.path))):
-            if isinstance(received.message, FaceLandmarks):
+            if isinstance(received.message, FaceLandmarks) and not received.message.over:
                 told.setdefault(received.key.rpartition("/")[2], []).append((at, received.message))
         if len(told) != 1:
             reason = f"it has landmarks of {', '.join(sorted(told))}" if told else "it has no landmarks"
