@@ -19,6 +19,7 @@ class ActionBegan(Struct, frozen=True, kw_only=True, tag="action_began", omit_de
     """evt: an actor has begun an action. A new `look` ends the actor's previous one.
 
     targets: entity ids; an actor's id means the face; empty: `look` goes away from everything, others have no target.
+    one_of: it is at one of the targets, and perception cannot tell at which. confidence: that this is so.
     behavior: of the robot, `block:behavior`; empty for people.
     """
 
@@ -26,6 +27,7 @@ class ActionBegan(Struct, frozen=True, kw_only=True, tag="action_began", omit_de
     action: Action
     at: Stamp
     targets: tuple[str, ...] = ()
+    one_of: bool = False
     confidence: Probability = 1.0
     behavior: str = ""
 

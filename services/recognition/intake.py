@@ -184,6 +184,8 @@ class Intake:
         self._former_until = max(self._former_until, state.at.seconds)
         if isinstance(state, Statistics):
             self._statistics.resume(state, now)
+            if state.head is not None:
+                self._recognizer.resume_head(self._identities.inside(state.actor), state.head, now)
             return
         pairs = [each for each in state.events if each.kind == "adjacency_pair" and each.state == "started"]
         for former in pairs[-1:]:  # one before it has been answered, by the robot's own first turn
@@ -413,7 +415,8 @@ class Intake:
         name = self._identities.name
         busy = {name(id) for id in self._recognizer.session.busy}
         contacts = {name(id): much for id, much in self._recognizer.contacts().items()}
-        self._statistics.feed(counted, busy, self._now, contacts)
+        heads = {name(id): head for id, head in self._recognizer.heads().items()}
+        self._statistics.feed(counted, busy, self._now, contacts, heads)
         for statistics in self._statistics.told(self._now):
             if statistics.actor != "all":  # a person with this id would be taken for everybody
                 out.append(PublishMessage(keys.statistics(statistics.actor or "all"), statistics))
