@@ -115,6 +115,20 @@ class HeadPose(Struct, frozen=True, kw_only=True, tag="head_pose", omit_defaults
     mouth: Probability | None = None
 
 
+class Looked(Struct, frozen=True, kw_only=True, tag="looked", omit_defaults=True):
+    """stream: perception. A source of head poses has looked until now, and whom it saw.
+
+    Only this says that a face is not there: a source that tells nothing stalls, and nobody has gone by that.
+
+    at: when the picture was taken. seen: people whose face was in it; missed: people whom it follows, and whose face
+    was not.
+    """
+
+    at: Stamp
+    seen: tuple[str, ...] = ()
+    missed: tuple[str, ...] = ()
+
+
 class VoiceActivity(Struct, frozen=True, kw_only=True, tag="voice_activity", omit_defaults=True):
     """stream: perception. Voice of a person, heard or not."""
 

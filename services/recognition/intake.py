@@ -27,6 +27,7 @@ from engage_hri.schemas.perception import (
     ActorFound,
     ActorLost,
     HeadPose,
+    Looked,
     OngoingActions,
     Utterance,
     VoiceActivity,
@@ -74,13 +75,13 @@ from engage_hri.services.runtime.intake import (
 
 Content = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | OngoingActions | World | RobotState | HeadOwner | WordSpoken
-    | SyncPointProgress | BlockProgress | HeadPose | VoiceActivity | Utterance | RequestEvent | SignalTurn | Cancel
-    | PeerAlive | PeerGone | ConnectionEvent | Statistics | SamePeople | OpenEvents
+    | SyncPointProgress | BlockProgress | HeadPose | Looked | VoiceActivity | Utterance | RequestEvent | SignalTurn
+    | Cancel | PeerAlive | PeerGone | ConnectionEvent | Statistics | SamePeople | OpenEvents
 )  # fmt: skip
 """Messages that recognition takes into account; the last four are those of its former life, and come by no bus."""
 _CONTENT = get_args(Content)
 Former = ConnectionEvent | Statistics | SamePeople | OpenEvents
-_News = ActionBegan | ActionEnded | ActorFound | ActorLost | HeadPose | VoiceActivity | Utterance
+_News = ActionBegan | ActionEnded | ActorFound | ActorLost | HeadPose | Looked | VoiceActivity | Utterance
 """Messages that tell of what has just happened."""
 
 EVENTS_KEPT = 64
@@ -341,7 +342,7 @@ class Intake:
         if stamp is None:
             return arrived
         at = self._instant(stamp)
-        if not isinstance(observation, HeadOwner | World):
+        if not isinstance(observation, HeadOwner | Looked | World):
             actor = observation.actor if isinstance(observation, HeadPose | VoiceActivity) else self._robot
             self._note_error(actor, stamp, at)
         return at

@@ -12,7 +12,15 @@ from functools import partial
 from itertools import count
 
 from engage_hri.schemas.body import RobotState, WordSpoken
-from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose, VoiceActivity
+from engage_hri.schemas.perception import (
+    ActionBegan,
+    ActionEnded,
+    ActorFound,
+    ActorLost,
+    HeadPose,
+    Looked,
+    VoiceActivity,
+)
 from engage_hri.schemas.recognition import ConnectionEvent, HeadHabit, RequestEvent, SignalTurn
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
@@ -33,7 +41,7 @@ OLDEST: Seconds = 0.5
 decided. Ours."""
 HALF_SURE: Probability = 0.5
 """Confidence above which a meeting of eyes is learned from: a look at one of two has half of it."""
-Perceived = Observation | HeadPose | VoiceActivity | RobotState | WordSpoken | TimedWords
+Perceived = Observation | HeadPose | Looked | VoiceActivity | RobotState | WordSpoken | TimedWords
 Result = Effect | Symbolic
 """The actions among them were derived from raw perception; the session gets them without another call."""
 
@@ -80,7 +88,7 @@ class Recognizer:
         at = at if math.isfinite(at) else now
         derived: list[Symbolic] = []
         match observation:
-            case HeadPose() | VoiceActivity():
+            case HeadPose() | Looked() | VoiceActivity():
                 if now - at <= OLDEST:
                     derived = self._attend(lambda attention: attention.feed(observation, at), at)
             case RobotState():

@@ -104,6 +104,11 @@ class Seeing:
             told += self._seen(face)
         return told
 
+    @property
+    def missed(self) -> tuple[str, ...]:
+        """People who are followed, and whose face was not in the latest picture."""
+        return tuple(face.id for face in self._tracker.named if face.at < self._at)
+
     def end(self) -> list[Seen]:
         """Let all go: nobody looks any more."""
         return [each for face in self._tracker.named for each in self._gone(face.id, face.at)]

@@ -14,7 +14,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.landmarks import FaceLandmarks
 from engage_hri.schemas.participants import PeerAlive
-from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose, Looked
 from engage_hri.schemas.units import Meters, Seconds, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus import journal
@@ -122,7 +122,12 @@ class _Eyes:
             journal.alert(self._bus.log, "seeing again")
         at = landmarks.at.seconds
         self._bus.publish(keys.landmarks(self._bus.name), replace(landmarks, at=self._bus.stamp(at)))
-        self._tell(self._seeing.feed(landmarks, at), at)
+        seen = self._seeing.feed(landmarks, at)
+        self._tell(seen, at)
+        heads = tuple(each.person for each in seen if isinstance(each, SeenHead))
+        self._bus.publish(
+            keys.looked(self._bus.name), Looked(at=self._bus.stamp(at), seen=heads, missed=self._seeing.missed)
+        )
 
     def _tell(self, seen: list[Seen], at: Seconds = 0.0) -> None:
         """Tell what is new. at: of the picture."""

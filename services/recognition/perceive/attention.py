@@ -22,7 +22,15 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.body import Ray, RobotState
-from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose, VoiceActivity
+from engage_hri.schemas.perception import (
+    ActionBegan,
+    ActionEnded,
+    ActorFound,
+    ActorLost,
+    HeadPose,
+    Looked,
+    VoiceActivity,
+)
 from engage_hri.schemas.recognition import HeadHabit
 from engage_hri.schemas.units import Probability, Seconds, Stamp, Vector
 from engage_hri.schemas.world import World
@@ -38,9 +46,13 @@ from engage_hri.services.recognition.perceive.manipulation import Manipulation, 
 from engage_hri.services.recognition.perceive.speech import SpeechDetector
 from engage_hri.services.reports.action_reports import FACE_GRACE
 
-Raw = HeadPose | VoiceActivity | World | RobotState
+Raw = HeadPose | Looked | VoiceActivity | World | RobotState
 Known = Literal["mutual", "point", "act"]
 """From what it is known at what a person looks: eyes that have met, a finger, a piece in the hand."""
+
+
+STALL: Seconds = 0.5
+"""Longest time between two instants at which a source has looked all the while. More is a stall. Decision 0239."""
 
 
 class _Actor:
@@ -54,6 +66,10 @@ class _Actor:
         self.voice = SpeechDetector()
         self.posed_at = self.heard_at = self.alive_at = NEVER
         """Times of the latest head pose and voice level, and of the latest sign of life."""
+        self.looked_at: Seconds | None = None
+        """Time until which a source has looked for this face; None: none tells that."""
+        self.missed: Seconds = 0.0
+        """Time for which it has looked since the latest pose, and not seen it."""
         self.seen = False
         """True while the face is found and not lost since."""
         self.reported: set[Action] = set()
@@ -66,12 +82,24 @@ class _Actor:
         """How much the head attends to the robot; None: it is not seen, or perception reports looks itself."""
 
     @property
+    def may_be_lost(self) -> bool:
+        """True if no news are a sign of absence: the source has looked in vain, or never tells when it looks."""
+        return self.looked_at is None or self.missed >= FACE_GRACE - ROUNDING
+
+    @property
     def face_lost_at(self) -> Seconds | None:
-        return self.posed_at + FACE_GRACE if self.looking.nearest is not None else None
+        return self.posed_at + FACE_GRACE if self.looking.nearest is not None and self.may_be_lost else None
 
     @property
     def lost_at(self) -> Seconds | None:
-        return self.alive_at + FACE_GRACE if self.seen and not self.presence_reported else None
+        is_counted = self.seen and not self.presence_reported and self.may_be_lost
+        return self.alive_at + FACE_GRACE if is_counted else None
+
+    def is_looked_for(self, at: Seconds, *, is_seen: bool) -> None:
+        """Take that a source has looked for this face. Of the time between only that counts in which it does."""
+        step = at - (self.looked_at if self.looked_at is not None else at)
+        self.missed = 0.0 if is_seen else self.missed + (step if step <= STALL else 0.0)
+        self.looked_at = at
 
     @property
     def deadlines(self) -> Iterator[Seconds]:
@@ -137,6 +165,12 @@ class Attention:
             case HeadPose():
                 actions += self._take_pose(self._actor(observation.actor, at), observation, at)
                 self._attend(observation.actor)
+            case Looked():
+                for id in (*observation.seen, *observation.missed):
+                    if (actor := self._actors.get(id)) is not None and at > (actor.looked_at or NEVER):
+                        actor.is_looked_for(at, is_seen=id in observation.seen)
+                        self._attend(id)
+                actions += self.advance(at)
             case VoiceActivity():
                 actions += self._take_voice(self._actor(observation.actor, at), observation, at)
                 self._attend(observation.actor)

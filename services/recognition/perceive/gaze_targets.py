@@ -3,9 +3,9 @@
 An angle is measured to the thing's extent: 0 when the gaze goes through its footprint, or the sphere of its radius.
 A covered thing stays where it was last seen, with a confidence that decays (thesis 5.4.2).
 
-Of a direction whose deviation is stated, the cone is what lies within `EDGE` deviations, and how far a thing is off,
-in deviations, says how likely it is. What is not likely enough to be named alone is named with its rivals, as one of
-them (decision 0238).
+Of a direction whose deviation is stated, each thing is as likely as it would be to find a head so that looks at it,
+and so is that it looks at none. What is not likely enough to be named alone is named with its rivals, as one of them
+(decision 0238).
 """
 
 import math
@@ -29,13 +29,19 @@ Spread = tuple[Radians, Radians]
 AWAY: Targets = ()
 SURFACE = "table"
 """Id of the surface that a thing lies on when none is seen under it."""
-EDGE = 2.45
-"""Deviations from the direction of a gaze up to which something may be what is looked at: 95 of 100 are within, if
-they fall as chance does in two directions. There it is as likely that the gaze is on nothing."""
+NOTHING = 4e-4
+"""Likelihood of a look at no thing, for each square degree: as often as at each thing, somewhere in 50 by 50 degrees.
+Of deviations of 3 and 5 degrees a thing is as likely up to 2.5 of them beside the gaze, of larger ones up to less."""
+FACE = 5.0
+"""How many times as likely a look at a face is as one at a thing: who talks looks at faces."""
+FARTHEST_OFF = 3.5
+"""Deviations from the gaze up to which anything is asked how likely it is."""
 LEAST_SPREAD: Radians = 0.02
 """Least deviation that is believed of a gaze: eyes wander on what they look at."""
 SURE: Probability = 0.9
 """Share of all likelihood that what is named has together."""
+ALONE: Probability = 0.95
+"""Share from which on a thing is named alone; once it is, `SURE` is enough."""
 KEPT: Probability = 0.75
 """Share with which what was named before stays: less than `SURE`, that a look between two things does not flutter."""
 MOST_NAMED = 3
@@ -121,19 +127,20 @@ class _Gaze:
         angle = math.acos(max(-1.0, min(1.0, along / max(distance, 1e-9))))
         return max(0.0, angle - math.asin(thing.radius / max(distance, 1e-9)))
 
-    def deviations_to(self, thing: _Thing, spread: Spread) -> float:
-        """Distance of the nearest point of the thing from the ray, in standard deviations of its direction."""
-        aside, above = (max(each, LEAST_SPREAD) for each in spread)
+    def likelihood(self, thing: _Thing, spread: Spread) -> float:
+        """Likelihood of this direction, for each square degree, of one who looks anywhere at the thing."""
         corners = self._corners(thing)
-        if corners:
-            return _to_polygon([(left / aside, up / above) for left, up in corners])
-        center = self.across(thing.entity.position)
-        if center is None:
-            return math.inf
-        off = math.hypot(*center)
-        reach = math.tan(math.asin(min(0.99, thing.radius / math.dist(thing.entity.position, self.eye))))
-        share = max(0.0, off - reach) / max(off, 1e-9)
-        return share * math.hypot(center[0] / aside, center[1] / above)
+        if not corners:
+            center = self.across(thing.entity.position)
+            if center is None:
+                return 0.0
+            reach = math.tan(math.asin(min(0.99, thing.radius / math.dist(thing.entity.position, self.eye))))
+            corners = [(center[0] - reach, center[1] - reach), (center[0] + reach, center[1] + reach)]
+        found = 1.0
+        for sides, each in zip(zip(*corners, strict=True), spread, strict=True):
+            low, high = (math.degrees(math.atan(side)) for side in (min(sides), max(sides)))
+            found *= _share_between(low, high, math.degrees(max(each, LEAST_SPREAD)))
+        return found
 
     def _corners(self, thing: _Thing) -> list[tuple[float, float]]:
         """Corners of the thing's outline across the ray; none: it has none, or one of them is behind."""
@@ -293,31 +300,31 @@ class GazeTargets:
         """Target of a gaze with a stated deviation: the fewest things of which one is `SURE` to be looked at."""
         likely: dict[str, float] = {}
         surest: Probability = 0.0
-        for _, _, thing in self._around(ray, min(EDGE * max(*spread, LEAST_SPREAD), 1.5)):
+        for _, _, thing in self._around(ray, min(FARTHEST_OFF * max(*spread, LEAST_SPREAD), 1.5)):
             seen = sure * self._confidence(thing, at)
             if seen >= self._least and thing.entity.id != looker:
-                off = ray.deviations_to(thing, spread)
-                if off < EDGE:
-                    name = self._reported(thing.entity)
-                    likely[name] = max(likely.get(name, 0.0), math.exp(-off * off / 2))
-                    surest = max(surest, seen)
-        whole, nothing = sum(likely.values()), math.exp(-EDGE * EDGE / 2)
-        on_something = whole / (whole + nothing)
-        if not likely or on_something < 0.5:
-            beneath = self._beneath(ray, at, sure)
-            return beneath._replace(confidence=beneath.confidence * (1 - on_something))
+                name = self._reported(thing.entity)
+                weight = FACE if thing.entity.kind == "person" else 1.0
+                likely[name] = likely.get(name, 0.0) + weight * ray.likelihood(thing, spread)
+                surest = max(surest, seen)
+        beneath = self._beneath(ray, at, sure)
+        whole = sum(likely.values()) + NOTHING
+        if whole <= 2 * NOTHING:
+            return beneath._replace(confidence=beneath.confidence * NOTHING / whole)
+        for name in beneath.targets:
+            likely[name] = likely.get(name, 0.0) + NOTHING
         named, share = list[str](), 0.0
         for name in sorted(likely, key=lambda name: (-likely[name], name)):
-            if share < SURE:
+            if share < (ALONE if len(named) == 1 else SURE):
                 named.append(name)
                 share += likely[name] / whole
         before = sum(likely.get(name, 0.0) for name in present) / whole
-        if before >= KEPT and (len(present) <= len(named) or share < (1 + SURE) / 2):
-            named = [*present]
-        on = {self._surface_of(name) for name in named}
-        if len(named) > MOST_NAMED and len(on) == 1 and (surface := on.pop()):
-            named = [surface]
-        return GazeTarget(tuple(sorted(named)), surest * on_something, len(named) > 1)
+        if before >= (SURE if len(present) == 1 else KEPT) and len(named) > 1:
+            named, share = [*present], before
+        on = {self._surface_of(name) or name for name in named}
+        if len(named) > MOST_NAMED and len(on) == 1:
+            named = [*on]
+        return GazeTarget(tuple(sorted(named)), surest * share, len(named) > 1)
 
     def _surface_of(self, id: str) -> str:
         """The surface that a thing lies on; empty: none, it is a face, or a surface itself."""
@@ -381,6 +388,13 @@ def _is_inside(corners: list[tuple[float, float]]) -> bool:
         if (y > 0.0) != (v > 0.0) and x - y * (u - x) / (v - y) > 0.0:
             inside = not inside
     return inside
+
+
+def _share_between(low: float, high: float, spread: float) -> float:
+    """Density at 0 of what falls with a deviation around a place that is anywhere between two."""
+    width = max(high - low, 1e-3)
+    far, near = (math.erf(side / (spread * math.sqrt(2))) for side in (high, low))
+    return (far - near) / (2 * width)
 
 
 def _to_polygon(corners: list[tuple[float, float]]) -> Radians:

@@ -32,8 +32,8 @@ KEPT = 24
 """Looks that are remembered of a person, the latest."""
 SHARED = 0.5
 """Share of the stated variance that is the same in all looks of a person."""
-BEHIND = 0.2
-"""Deviation of the share of a look's angle by which heads stay behind, over all people."""
+BEHIND, BEHIND_SPREAD = 0.2, 0.15
+"""Share of a look's angle by which heads stay behind, over all people, and its deviation: eyes go the rest."""
 STATED = 6
 """Looks for which a stated variance counts beside what the looks themselves show."""
 WRONG = 3.0
@@ -117,8 +117,6 @@ class SureLooks:
 
     def aim(self, head: Angles, spread: Angles) -> tuple[Angles, Angles]:
         """Where somebody looks, by where the head points; and its deviation. spread: stated, of the head."""
-        if not self.looks:
-            return head, spread
         lines = self._fitted(spread)
         aim = lines[0].aim(head[0]), lines[1].aim(head[1])
         return aim, (lines[0].deviation(aim[0]), lines[1].deviation(aim[1]))
@@ -164,10 +162,12 @@ def _fit(looks: Sequence[SureLook], axis: int, stated: Degrees) -> _Line:
 
 def _solved(pairs: Sequence[tuple[float, float]], scatter: float, shared: float) -> _Line:
     """Offset and share by least squares, with what is expected before any look."""
+    known = 1 / BEHIND_SPREAD**2
     a = 1 / max(shared, LEAST**2) + len(pairs) / scatter
     b = sum(aim for aim, _ in pairs) / scatter
-    c = 1 / BEHIND**2 + sum(aim * aim for aim, _ in pairs) / scatter
-    u, v = sum(beside for _, beside in pairs) / scatter, sum(aim * beside for aim, beside in pairs) / scatter
+    c = known + sum(aim * aim for aim, _ in pairs) / scatter
+    u = sum(beside for _, beside in pairs) / scatter
+    v = known * BEHIND + sum(aim * beside for aim, beside in pairs) / scatter
     whole = a * c - b * b
     share = max(-0.5, min(0.5, (a * v - b * u) / whole))
     return _Line((c * u - b * v) / whole, share, c / whole, a / whole, -b / whole, scatter)
