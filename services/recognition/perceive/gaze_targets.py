@@ -9,6 +9,7 @@ and so is that it looks at none. What is not likely enough to be named alone is 
 """
 
 import math
+from collections.abc import Mapping
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
@@ -313,17 +314,16 @@ class GazeTargets:
             return beneath._replace(confidence=beneath.confidence * NOTHING / whole)
         for name in beneath.targets:
             likely[name] = likely.get(name, 0.0) + NOTHING
-        named, share = list[str](), 0.0
-        for name in sorted(likely, key=lambda name: (-likely[name], name)):
-            if share < (ALONE if len(named) == 1 else SURE):
-                named.append(name)
-                share += likely[name] / whole
+        named, share = _fewest(likely, whole)
         before = sum(likely.get(name, 0.0) for name in present) / whole
         if before >= (SURE if len(present) == 1 else KEPT) and len(named) > 1:
             named, share = [*present], before
-        on = {self._surface_of(name) or name for name in named}
-        if len(named) > MOST_NAMED and len(on) == 1:
-            named = [*on]
+        if len(named) > MOST_NAMED:
+            on = dict[str, float]()
+            for name, much in likely.items():
+                surface = self._surface_of(name) or name
+                on[surface] = on.get(surface, 0.0) + much
+            named, share = _fewest(on, whole, alone=SURE)
         return GazeTarget(tuple(sorted(named)), surest * share, len(named) > 1)
 
     def _surface_of(self, id: str) -> str:
@@ -388,6 +388,16 @@ def _is_inside(corners: list[tuple[float, float]]) -> bool:
         if (y > 0.0) != (v > 0.0) and x - y * (u - x) / (v - y) > 0.0:
             inside = not inside
     return inside
+
+
+def _fewest(likely: Mapping[str, float], whole: float, alone: Probability = ALONE) -> tuple[list[str], Probability]:
+    """The fewest names that have together `SURE` of all likelihood, or the one that has `alone`; and their share."""
+    named, share = list[str](), 0.0
+    for name in sorted(likely, key=lambda name: (-likely[name], name)):
+        if share < (alone if len(named) == 1 else SURE):
+            named.append(name)
+            share += likely[name] / whole
+    return named, share
 
 
 def _share_between(low: float, high: float, spread: float) -> float:
