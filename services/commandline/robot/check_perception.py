@@ -60,7 +60,7 @@ def main(options: Options) -> int:
     for each in _judged(options):
         verdicts.append(each)
         if options.json:
-            print_format(each._asdict())
+            print_format(msgspec.json.encode(each._asdict()).decode())
         elif each.unjudged:
             typer.echo(f"not judged  {each.law}: {each.unjudged}")
         elif each.broken:

@@ -180,13 +180,12 @@ def _ids_are_kept(evidence: Evidence) -> Finding:
     joined = {each.message.actor for each in evidence.of(ActorFound) if each.message.same_as}  # type: ignore[union-attr]
     for person, poses in heads.items():
         first, begin, _ = poses[0]
-        for other, others in heads.items():
-            before = [each for each in others if each[1] < begin]
-            if other == person or person in joined or not before or len(before) < len(others):
+        for former, others in heads.items():
+            last, end, _ = others[-1]
+            if former == person or person in joined or end >= begin:
                 continue
-            last, end, _ = before[-1]
             if begin - end < GAP and dist(first.position, last.position) < SAME_PLACE:
-                return f"{person} comes where {other} was {begin - end:.1f} s before", (
+                return f"{person} comes where {former} was {begin - end:.1f} s before", (
                     f"keep an id for {GAP:g} s while a face is out of sight, or tell `same_as`"
                 )
     return FINE
@@ -209,15 +208,15 @@ def _stalls_are_told(evidence: Evidence) -> Finding:
 
 def _directions_are_right(evidence: Evidence) -> Finding:
     errors = _errors(evidence)
-    aside, above = (mean(each[axis] for each in errors) for axis in (0, 1))
-    scatter = max(pstdev(each[axis] for each in errors) for axis in (0, 1))
+    aside, above = (mean(each.angles[axis] for each in errors) for axis in (0, 1))
+    scatter = max(pstdev(each.angles[axis] for each in errors) for axis in (0, 1))
     if hypot(aside, above) <= BIAS and scatter <= MOST_SCATTER:
         return FINE
     broken = f"heads are told {aside:+.0f} degrees to their left and {above:+.0f} up of where they face"
     broken += f" in the mean, with a scatter of {scatter:.0f}"
     for advice, turned in MISTAKES.items():
         other = _errors(evidence, turned)
-        if mean(hypot(*each[:2]) for each in other) < 0.5 * mean(hypot(*each[:2]) for each in errors):
+        if mean(hypot(*each.angles) for each in other) < 0.5 * mean(hypot(*each.angles) for each in errors):
             return broken, advice
     if scatter > MOST_SCATTER:
         return broken, "degrees or radians? an angle in degrees that is taken for radians points anywhere"
@@ -228,13 +227,13 @@ def _directions_are_right(evidence: Evidence) -> Finding:
 
 
 def _spreads_are_honest(evidence: Evidence) -> Finding:
-    errors = [each for each in _errors(evidence) if each[2] is not None and each[3] is not None]
-    if len(errors) < ENOUGH:
+    pairs = [(each.angles, each.stated) for each in _errors(evidence) if each.stated is not None]
+    if len(pairs) < ENOUGH:
         raise Unjudged("no deviation is stated (`yaw_spread`, `pitch_spread`)")
     for axis, name in ((0, "yaw_spread"), (1, "pitch_spread")):
-        stated = [abs(each[2 + axis] or 0.0) for each in errors]
-        shares = [abs(each[axis]) < 2 * degrees(width) for each, width in zip(errors, stated, strict=True)]
-        share, middle = mean(shares), degrees(median(stated))
+        stated = [degrees(each[axis]) for _, each in pairs]
+        shares = [abs(angles[axis]) < 2 * width for (angles, _), width in zip(pairs, stated, strict=True)]
+        share, middle = mean(shares), median(stated)
         if HONEST[0] <= share <= HONEST[1] or (share > HONEST[1] and middle < 2.0):
             continue
         advice = "the deviation of each error, also of what is the same in all pictures of a person"
@@ -266,15 +265,18 @@ def _some_heads(evidence: Evidence) -> dict[str, list[tuple[HeadPose, Seconds, S
     return heads
 
 
-Error = tuple[Degrees, Degrees, float | None, float | None]
-"""Of a direction to its left and up, and what was stated of it, in radians."""
+class PoseError(NamedTuple):
+    """Error of a direction to its left and up, and what was stated of it, in radians."""
+
+    angles: tuple[Degrees, Degrees]
+    stated: tuple[float, float] | None
 
 
-def _errors(evidence: Evidence, turned: Callable[[Vector], Vector] = lambda direction: direction) -> list[Error]:
+def _errors(evidence: Evidence, turned: Callable[[Vector], Vector] = lambda direction: direction) -> list[PoseError]:
     """Errors of all poses of which the truth is known. turned: what is done to directions before."""
     if not evidence.truth:
         raise Unjudged("no truth is given (--truth)")
-    found: list[Error] = []
+    found: list[PoseError] = []
     for poses in evidence.heads().values():
         for pose, at, _ in poses:
             true = [each for each in evidence.truth if each.since <= at <= each.until]
@@ -283,8 +285,9 @@ def _errors(evidence: Evidence, turned: Callable[[Vector], Vector] = lambda dire
             x, y, z = (b - a for a, b in zip(pose.position, true[0].place, strict=True))
             left, up = _bearing(turned(pose.direction))
             true_left, true_up = _bearing((x, y, z))
-            aside = remainder(left - true_left, 360.0)
-            found.append((aside, up - true_up, pose.yaw_spread, pose.pitch_spread))
+            is_stated = pose.yaw_spread is not None and pose.pitch_spread is not None
+            stated = (pose.yaw_spread or 0.0, pose.pitch_spread or 0.0) if is_stated else None
+            found.append(PoseError((remainder(left - true_left, 360.0), up - true_up), stated))
     if len(found) < ENOUGH:
         raise Unjudged(f"the truth is known of fewer than {ENOUGH} poses")
     return found
