@@ -23,11 +23,13 @@ from engage_hri.services.perception.eyes.sources.litert import FaceFinder
 from engage_hri.services.recognition.perceive.gaze_targets import ROBOT_FACE, SURFACE
 from engage_hri.services.tangram.table import tangram_table
 from tests.perception.eyes.fetched import MODELS
-from tests.perception.eyes.people import CAMERA, JUDGED, Light, Person, Picture, Pose, drawn, noisy
+from tests.perception.eyes.people import CAMERA, JUDGED, Light, Person, Picture, Pose, drawn
 
 RATE = 15.0
 TURN: Seconds = 0.25
 """Time that a head needs for its way."""
+GRAINS = 7
+"""Patterns of noise that pictures have in turn."""
 SURE = 6
 """Looks at the beginning of which it is known at what they are."""
 BESIDE = "neighbor"
@@ -121,6 +123,8 @@ def _angles(eyes: Vector, place: Vector) -> tuple[float, float]:
 def pictures(person: FilmedPerson, looks: Sequence[FilmedLook]) -> Iterator[tuple[Seconds, Picture]]:
     """The pictures of some looks, in order: noise apart, two of each."""
     model = Person(JUDGED[person.number])
+    shape = (GRAINS, CAMERA.height, CAMERA.width, 3)
+    grain = np.rint(np.random.default_rng(person.number).normal(0, 3, shape)).astype(np.int16)
     for look in looks:
         way, still = (drawn([(model, pose)], person.light, seed=person.number) for pose in (look.way, look.pose))
         first, last = (int(np.ceil(at * RATE)) for at in (look.since - TURN, look.until))
@@ -128,7 +132,7 @@ def pictures(person: FilmedPerson, looks: Sequence[FilmedLook]) -> Iterator[tupl
             at = number / RATE
             share = (at - look.since) / TURN + 1
             if share > 0.25:  # before that it is still where it was
-                yield at, noisy(still if share > 0.75 else way, 3.0, number)
+                yield at, np.clip(grain[number % GRAINS] + (still if share > 0.75 else way), 0, 255).astype(np.uint8)
 
 
 def landmarks(person: FilmedPerson) -> Iterator[FaceLandmarks]:
