@@ -280,7 +280,7 @@ class SureLook(Struct, frozen=True, kw_only=True):
 
 
 class HeadHabit(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """How the head of a person points beside what this person looks at, degrees to their left and up.
+    """Habit of a head: how it points beside what this person looks at, degrees to their left and up.
 
     offset: of the robot's face from the head of who looks at it. behind: share of the way to what is aside of it that
     the head does not go. deviation: of a look that is mended by both. looks: from which that is known, the latest.

@@ -149,7 +149,7 @@ class Recognizer:
         return {id: max(much, default=None) for id, much in known.items()}
 
     def heads(self) -> dict[str, HeadHabit]:
-        """What is known of people's heads, of those of whom something has been learned since the last call."""
+        """Take what is known of people's heads, of those of whom something has been learned since the last call."""
         learned, self._attention.learned = self._attention.learned, {}
         return learned
 

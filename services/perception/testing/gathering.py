@@ -1,4 +1,4 @@
-"""What a source of head poses has told: from a recording, or by letting one of ours look now."""
+"""Evidence of what a source of head poses has told: a recording, or what eyes tell while they look with it."""
 
 import asyncio
 import csv
@@ -53,7 +53,7 @@ def truth_of(path: Path) -> tuple[TrueLook, ...]:
 
 
 def recorded(path: Path, truth: Sequence[TrueLook]) -> Evidence:
-    """What was told in a recording. Times are seconds from its beginning. Raises InputRefused."""
+    """Gather what was told in a recording. Times are seconds from its beginning. Raises InputRefused."""
     recording, told = read(path), list[Told]()
     times = RecordingTimes(recording)
     for number in range(len(recording)):
@@ -65,7 +65,10 @@ def recorded(path: Path, truth: Sequence[TrueLook]) -> Evidence:
 
 
 async def seen(config: EyesConfig, seconds: Seconds, truth: Sequence[TrueLook]) -> Evidence:
-    """What eyes tell with a source, for a while. Times are seconds from its first picture. Raises InputRefused."""
+    """Gather what eyes tell with a source for a while. Times are seconds from its first picture.
+
+    Raises InputRefused.
+    """
     hub, told, begin = MemoryHub(), list[Told](), asyncio.get_running_loop().time()
     with hub.join("check", role="observer").subscribe(*PATTERNS) as inbox:
         async with (

@@ -1,4 +1,4 @@
-"""How the head of one person points beside what this person looks at, learned from looks that are sure. Pure.
+"""Model of how the head of one person points beside what they look at, learned from looks that are sure. Pure.
 
     looks = SureLooks()
     looks.take(head, aim, spread, at)            # while it is known from elsewhere what is looked at
@@ -116,7 +116,7 @@ class SureLooks:
         return True
 
     def aim(self, head: Angles, spread: Angles) -> tuple[Angles, Angles]:
-        """Where somebody looks, by where the head points; and its deviation. spread: stated, of the head."""
+        """Tell where somebody looks, by where the head points; and its deviation. spread: stated, of the head."""
         lines = self._fitted(spread)
         aim = lines[0].aim(head[0]), lines[1].aim(head[1])
         return aim, (lines[0].deviation(aim[0]), lines[1].deviation(aim[1]))
@@ -130,7 +130,7 @@ class SureLooks:
         return left.offset, up.offset
 
     def habit(self) -> HeadHabit | None:
-        """What is known; None: nothing."""
+        """Tell what is known; None: nothing."""
         if not self.looks:
             return None
         left, up = self._fitted(self.looks[-1].spread)
