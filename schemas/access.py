@@ -190,7 +190,7 @@ def _looks(role: str, *more: str) -> Iterator[Row]:
     yield from (Row(role, "subscribes", key, "shown by `engage console`") for key in shown)
 
 
-_RAW = (keys.ANY_HEAD_POSE, keys.ANY_VOICE_ACTIVITY)
+_RAW = (keys.ANY_HEAD_POSE, keys.ANY_LOOKED, keys.ANY_VOICE_ACTIVITY)
 _NO_PROGRAM = "of no program of ours: for those of others"
 
 TABLE: tuple[Row, ...] = (

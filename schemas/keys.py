@@ -70,6 +70,7 @@ ROBOT_MOTION = f"{PREFIX}/stream/control/robot_state"
 """The same as `ROBOT_STATE`, many times a second, while somebody listens."""
 NET = f"{PREFIX}/stream/realizer/net"
 ANY_HEAD_POSE = f"{PREFIX}/stream/perception/head/*"
+ANY_LOOKED = f"{PREFIX}/stream/perception/looked/*"
 ANY_VOICE_ACTIVITY = f"{PREFIX}/stream/perception/voice/*"
 ANY_LANDMARKS = f"{PREFIX}/stream/perception/landmarks/*"
 """`FaceLandmarks` of all sources."""
@@ -264,6 +265,11 @@ def reporter_of(key: str) -> str:
 
 def head_pose(actor: str) -> str:
     return f"{PREFIX}/stream/perception/head/{actor}"
+
+
+def looked(source: str) -> str:
+    """Key of what a source of head poses has looked at. source: a name of its own."""
+    return f"{PREFIX}/stream/perception/looked/{source}"
 
 
 def voice_activity(actor: str) -> str:

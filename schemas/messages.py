@@ -49,7 +49,8 @@ Message = (
     | body.RobotSeen | body.DescribeBody | body.Capabilities | body.EstimateBehaviors | body.Estimates
     | body_faults.SwitchFaults | body_faults.FaultsSwitched | body_faults.BodyFaults
     | perception.ActionBegan | perception.ActionEnded | perception.ActorFound | perception.ActorLost
-    | perception.OngoingActions | perception.Utterance | perception.HeadPose | perception.VoiceActivity
+    | perception.OngoingActions | perception.Utterance | perception.HeadPose | perception.Looked
+    | perception.VoiceActivity
     | sound.SoundFrame
     | landmarks.FaceLandmarks
     | world.World

@@ -19,6 +19,7 @@ class ActionBegan(Struct, frozen=True, kw_only=True, tag="action_began", omit_de
     """evt: an actor has begun an action. A new `look` ends the actor's previous one.
 
     targets: entity ids; an actor's id means the face; empty: `look` goes away from everything, others have no target.
+    one_of: it is at one of the targets, and perception cannot tell at which. confidence: that this is so.
     behavior: of the robot, `block:behavior`; empty for people.
     """
 
@@ -26,6 +27,7 @@ class ActionBegan(Struct, frozen=True, kw_only=True, tag="action_began", omit_de
     action: Action
     at: Stamp
     targets: tuple[str, ...] = ()
+    one_of: bool = False
     confidence: Probability = 1.0
     behavior: str = ""
 
@@ -111,6 +113,20 @@ class HeadPose(Struct, frozen=True, kw_only=True, tag="head_pose", omit_defaults
     yaw_spread: Spread | None = None
     pitch_spread: Spread | None = None
     mouth: Probability | None = None
+
+
+class Looked(Struct, frozen=True, kw_only=True, tag="looked", omit_defaults=True):
+    """stream: perception. A source of head poses has looked until now, and whom it saw.
+
+    Only this says that a face is not there: a source that tells nothing stalls, and nobody has gone by that.
+
+    at: when the picture was taken. seen: people whose face was in it; missed: people whom it follows, and whose face
+    was not.
+    """
+
+    at: Stamp
+    seen: tuple[str, ...] = ()
+    missed: tuple[str, ...] = ()
 
 
 class VoiceActivity(Struct, frozen=True, kw_only=True, tag="voice_activity", omit_defaults=True):

@@ -6,7 +6,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.behaviors import Action, Cause, Event, EventKind, TurnSignal
 from engage_hri.schemas.requests import Outcome, Request
-from engage_hri.schemas.units import Probability, Seconds, Stamp
+from engage_hri.schemas.units import Degrees, Probability, Seconds, Stamp
 
 EventState = Literal["started", "succeeded", "failed", "preempted", "withdrawn", "superseded", "completed", "lost"]
 """`lost`: the end of the event is unknown. Readers end all open events so when recognition has died (`PeerGone`);
@@ -29,6 +29,7 @@ class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event",
     id: made by recognition. kind: which of the four. state: the one that it has now.
     initiator: actor id of the one that began it. responder: actor id of the one that is to answer.
     started: when it began: of a gaze, when the initiator's look had arrived. objects: ids of what it is about.
+    one_of: it is about one of the objects; which one the person looks at could not be told.
     cause: what it was begun for; `human`: a person began it. optional: its failure does not count.
     delay: seconds from the initiator's start to the responder's start; of an adjacency pair from the end of the turn,
     and negative for an early answer; of a failed event from its start to its failure; None while undecided and for
@@ -47,6 +48,7 @@ class ConnectionEvent(Struct, frozen=True, kw_only=True, tag="connection_event",
     """Instant of this change."""
     started: Stamp
     objects: tuple[str, ...] = ()
+    one_of: bool = False
     cause: Cause = "human"
     optional: bool = False
     delay: Seconds | None = None
@@ -262,6 +264,34 @@ class PersonContact(Struct, frozen=True, kw_only=True, omit_defaults=True):
     ended: Stamp | None = None
 
 
+Angles = tuple[Degrees, Degrees]
+"""To a person's left and up, from the line between this person's eyes and the robot's face."""
+
+
+class SureLook(Struct, frozen=True, kw_only=True):
+    """Look of a person at something that was known.
+
+    head: where the head pointed. aim: where that was. spread: deviation of the head, as it was stated.
+    """
+
+    head: Angles
+    aim: Angles
+    spread: Angles
+
+
+class HeadHabit(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Habit of a head: how it points beside what this person looks at, degrees to their left and up.
+
+    offset: of the robot's face from the head of who looks at it. behind: share of the way to what is aside of it that
+    the head does not go. deviation: of a look that is mended by both. looks: from which that is known, the latest.
+    """
+
+    offset: Angles
+    behind: tuple[float, float]
+    deviation: Angles
+    looks: tuple[SureLook, ...] = ()
+
+
 class Statistics(Struct, frozen=True, kw_only=True, tag="statistics", omit_defaults=True):
     """state: recognition. Statistics of the connection events with one person, or with all, and their engagement.
 
@@ -270,7 +300,7 @@ class Statistics(Struct, frozen=True, kw_only=True, tag="statistics", omit_defau
     engagement: estimate in 0..1; None: too little is known. level: the same in a word. reasons: why, in words.
     busy: the person is busy with a task, so that silence is no sign of less engagement.
     busy_until: when the last task was over. level_since: when the level became what it is; of both None: not known.
-    contact: contact of the person with the robot.
+    contact: contact of the person with the robot. head: what has been learned of this person's head; None: nothing.
     """
 
     actor: str
@@ -284,3 +314,4 @@ class Statistics(Struct, frozen=True, kw_only=True, tag="statistics", omit_defau
     busy_until: Stamp | None = None
     level_since: Stamp | None = None
     contact: PersonContact = PersonContact()
+    head: HeadHabit | None = None

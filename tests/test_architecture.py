@@ -61,7 +61,7 @@ LAYERS = {
     " keyring",
     "services/control": "mujoco reachy_mini torso > figure service testing > bases calibrating serving voice"
     " > contract > config motion",
-    "services/perception": "eyes hearing > child offered",
+    "services/perception": "testing > eyes hearing > child offered",
     "services/perception/eyes": "service > pages > people seat > watching > sources > seeing > nodding tracking"
     " > camera head_pose one_euro > looking > config",
     "services/perception/hearing": "service > device pages > intake > speeches"

@@ -12,7 +12,14 @@ from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.behavior_types import TYPES, dialect_sync, same_instant
 from engage_hri.schemas.blocks import Block, Hold, WarningFeedback
 from engage_hri.schemas.fragments import Claim, TurnFragment
-from engage_hri.schemas.recognition import ConnectionEvent, Floor, Interjection, InterjectionReading, Statistics
+from engage_hri.schemas.recognition import (
+    ConnectionEvent,
+    Floor,
+    HeadHabit,
+    Interjection,
+    InterjectionReading,
+    Statistics,
+)
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.vocabulary import normal
@@ -103,12 +110,26 @@ def warning(message: WarningFeedback) -> str:
 
 
 def statistics(statistics: Statistics) -> str:
-    """Write `anna: engaged 0.92; 12 events, MTBCE 5.31 s`, with the reasons if the level is less than engaged."""
+    """Write `anna: engaged 0.92; 12 events, MTBCE 5.31 s`, with the reasons if the level is less than engaged.
+
+    Behind it, how the head points of a person of whom that is known: `; head 2.1 degrees left, 4.0 down of ...`.
+    """
     engagement = f"{statistics.level} {number(statistics.engagement)}" if statistics.engagement is not None else "-"
     reasons = f" ({'; '.join(statistics.reasons)})" if statistics.reasons and statistics.level != "engaged" else ""
     count = statistics.session.events
     events = f"{count} event{'' if count == 1 else 's'}, MTBCE {seconds(statistics.session.mtbce)}"
-    return f"{statistics.actor or 'all'}: {engagement}{reasons}; {events}"
+    return f"{statistics.actor or 'all'}: {engagement}{reasons}; {events}{_head(statistics.head)}"
+
+
+def _head(head: HeadHabit | None) -> str:
+    """Write where a head points whose person looks at the robot, and from how many looks that is known."""
+    if head is None:
+        return ""
+    left, up = -head.offset[0], -head.offset[1]
+    aside = f"{abs(left):.1f} degrees {'left' if left > 0 else 'right'}"
+    above = f"{abs(up):.1f} {'up' if up > 0 else 'down'}"
+    count = len(head.looks)
+    return f"; head {aside}, {above} of what is looked at, by {count} look{'' if count == 1 else 's'}"
 
 
 def held(hold: Hold) -> str:

@@ -68,6 +68,10 @@ class PipedProcess:
             self._unsent += content
             self._push()
 
+    def kill(self) -> None:
+        """Let it end as if the system had ended it: `on_end` is told."""
+        self._process.kill()
+
     def close(self) -> None:
         """End it. It has no last words."""
         if not self._is_open:

@@ -27,6 +27,7 @@ from engage_hri.schemas.perception import (
     ActorFound,
     ActorLost,
     HeadPose,
+    Looked,
     OngoingActions,
     Utterance,
     VoiceActivity,
@@ -74,13 +75,13 @@ from engage_hri.services.runtime.intake import (
 
 Content = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | OngoingActions | World | RobotState | HeadOwner | WordSpoken
-    | SyncPointProgress | BlockProgress | HeadPose | VoiceActivity | Utterance | RequestEvent | SignalTurn | Cancel
-    | PeerAlive | PeerGone | ConnectionEvent | Statistics | SamePeople | OpenEvents
+    | SyncPointProgress | BlockProgress | HeadPose | Looked | VoiceActivity | Utterance | RequestEvent | SignalTurn
+    | Cancel | PeerAlive | PeerGone | ConnectionEvent | Statistics | SamePeople | OpenEvents
 )  # fmt: skip
 """Messages that recognition takes into account; the last four are those of its former life, and come by no bus."""
 _CONTENT = get_args(Content)
 Former = ConnectionEvent | Statistics | SamePeople | OpenEvents
-_News = ActionBegan | ActionEnded | ActorFound | ActorLost | HeadPose | VoiceActivity | Utterance
+_News = ActionBegan | ActionEnded | ActorFound | ActorLost | HeadPose | Looked | VoiceActivity | Utterance
 """Messages that tell of what has just happened."""
 
 EVENTS_KEPT = 64
@@ -184,6 +185,8 @@ class Intake:
         self._former_until = max(self._former_until, state.at.seconds)
         if isinstance(state, Statistics):
             self._statistics.resume(state, now)
+            if state.head is not None:
+                self._recognizer.resume_head(self._identities.inside(state.actor), state.head, now)
             return
         pairs = [each for each in state.events if each.kind == "adjacency_pair" and each.state == "started"]
         for former in pairs[-1:]:  # one before it has been answered, by the robot's own first turn
@@ -339,7 +342,7 @@ class Intake:
         if stamp is None:
             return arrived
         at = self._instant(stamp)
-        if not isinstance(observation, HeadOwner | World):
+        if not isinstance(observation, HeadOwner | Looked | World):
             actor = observation.actor if isinstance(observation, HeadPose | VoiceActivity) else self._robot
             self._note_error(actor, stamp, at)
         return at
@@ -413,7 +416,8 @@ class Intake:
         name = self._identities.name
         busy = {name(id) for id in self._recognizer.session.busy}
         contacts = {name(id): much for id, much in self._recognizer.contacts().items()}
-        self._statistics.feed(counted, busy, self._now, contacts)
+        heads = {name(id): head for id, head in self._recognizer.heads().items()}
+        self._statistics.feed(counted, busy, self._now, contacts, heads)
         for statistics in self._statistics.told(self._now):
             if statistics.actor != "all":  # a person with this id would be taken for everybody
                 out.append(PublishMessage(keys.statistics(statistics.actor or "all"), statistics))

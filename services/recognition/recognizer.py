@@ -12,8 +12,16 @@ from functools import partial
 from itertools import count
 
 from engage_hri.schemas.body import RobotState, WordSpoken
-from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose, VoiceActivity
-from engage_hri.schemas.recognition import RequestEvent, SignalTurn
+from engage_hri.schemas.perception import (
+    ActionBegan,
+    ActionEnded,
+    ActorFound,
+    ActorLost,
+    HeadPose,
+    Looked,
+    VoiceActivity,
+)
+from engage_hri.schemas.recognition import ConnectionEvent, HeadHabit, RequestEvent, SignalTurn
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
@@ -31,7 +39,9 @@ from engage_hri.services.reports.same_people import renamed
 OLDEST: Seconds = 0.5
 """Greatest age at which a head pose or a voice level that arrives still counts: an older one tells of what has been
 decided. Ours."""
-Perceived = Observation | HeadPose | VoiceActivity | RobotState | WordSpoken | TimedWords
+HALF_SURE: Probability = 0.5
+"""Confidence above which a meeting of eyes is learned from: a look at one of two has half of it."""
+Perceived = Observation | HeadPose | Looked | VoiceActivity | RobotState | WordSpoken | TimedWords
 Result = Effect | Symbolic
 """The actions among them were derived from raw perception; the session gets them without another call."""
 
@@ -78,7 +88,7 @@ class Recognizer:
         at = at if math.isfinite(at) else now
         derived: list[Symbolic] = []
         match observation:
-            case HeadPose() | VoiceActivity():
+            case HeadPose() | Looked() | VoiceActivity():
                 if now - at <= OLDEST:
                     derived = self._attend(lambda attention: attention.feed(observation, at), at)
             case RobotState():
@@ -138,9 +148,18 @@ class Recognizer:
         }
         return {id: max(much, default=None) for id, much in known.items()}
 
+    def heads(self) -> dict[str, HeadHabit]:
+        """Take what is known of people's heads, of those of whom something has been learned since the last call."""
+        learned, self._attention.learned = self._attention.learned, {}
+        return learned
+
+    def resume_head(self, person: str, head: HeadHabit, at: Seconds) -> None:
+        """Go on from what a former life has learned of somebody's head."""
+        self._attention.resume_head(person, head, at)
+
     def join(self, other: str, kept: str, at: Seconds, *, speaks: bool) -> list[Result]:
         """Take two persons for one, who is `kept` from now on: see `Session.join`."""
-        self._attention.forget(other)
+        self._attention.join(other, kept, at)
         self._interrupted.forget(other)
         self._words.join(other, kept)
 
@@ -198,6 +217,10 @@ class Recognizer:
 
     def _told(self, results: list[Result]) -> list[Result]:
         for result in results:
+            if isinstance(result, ConnectionEvent) and result.kind == "mutual_facial_gaze":
+                met = result.state == "succeeded" and result.confidence > HALF_SURE
+                person = result.person(self.session.robot)
+                self._attention.knows(person, "mutual", self.session.robot if met else "")
             if isinstance(result, PersonForgotten):
                 self._interrupted.forget(result.actor)
                 self._words.forget(result.actor)

@@ -37,7 +37,7 @@ async def recognize(bus: Bus, ready: Ready, config: RecognitionConfig) -> None:
     patterns = (
         keys.ROBOT_ACTION, keys.PERCEIVED_ACTION, keys.UTTERANCE, keys.ROBOT_ONGOING, keys.ANY_PERCEIVED_ONGOING,
         keys.FEEDBACK, keys.HEAD_OWNER, keys.WORLD, keys.SYNC_POINT,
-        keys.ANY_HEAD_POSE, keys.ANY_VOICE_ACTIVITY, keys.ROBOT_STATE,
+        keys.ANY_HEAD_POSE, keys.ANY_LOOKED, keys.ANY_VOICE_ACTIVITY, keys.ROBOT_STATE,
         *RequestDesk.patterns("recognition"),
     )  # fmt: skip
     with bus.subscribe(*patterns) as inbox:

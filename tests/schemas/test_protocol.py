@@ -49,8 +49,8 @@ def test_every_key_is_in_the_table() -> None:
     }
     makers = (
         keys.cancel, keys.keep_alive, keys.request_state, keys.fault, keys.statistics, keys.status,
-        keys.head_pose, keys.voice_activity, keys.landmarks, keys.sound, keys.open_events, keys.interjection,
-        keys.settings, keys.taken,
+        keys.head_pose, keys.looked, keys.voice_activity, keys.landmarks, keys.sound, keys.open_events,
+        keys.interjection, keys.settings, keys.taken,
     )  # fmt: skip
     made = {make("x").replace("*/*", "x/x") for make in makers}
     made |= {keys.connection_event("x", "x"), keys.perceived_ongoing("x", "x"), keys.alive("x", "x")}  # type: ignore[arg-type]

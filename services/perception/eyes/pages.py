@@ -70,7 +70,7 @@ class PageEyes:
         if page is None or now - at > OLD:
             return
         page.came = now
-        self._people.tell(page.seeing.feed(landmarks, at), at)
+        self._people.looked(person, page.seeing.feed(landmarks, at), page.seeing.missed, at)
 
     def _begin(self, person: str) -> _PageCamera | None:
         """Begin to see with the camera of a page. None: there are so many that it is not followed."""

@@ -1,10 +1,10 @@
 """People whom eyes see, as they tell the bus of them."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose, Looked
 from engage_hri.schemas.units import Meters, Seconds, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus, Received
@@ -28,6 +28,15 @@ class SeenPeople:
     def place(self, person: str) -> Vector | None:
         """Place of somebody in the world; None: they are not there."""
         return next((each.position for each in self._world.entities if each.id == person), None)
+
+    def looked(self, source: str, seen: Sequence[Seen], missed: tuple[str, ...], at: Seconds) -> None:
+        """Tell what is new in a picture, and that a source has looked until then.
+
+        missed: people who are followed, and whose face was not in it. at: loop time of the picture.
+        """
+        self.tell(seen, at)
+        heads = tuple(each.person for each in seen if isinstance(each, SeenHead))
+        self._bus.publish(keys.looked(source), Looked(at=self._bus.stamp(at), seen=heads, missed=missed))
 
     def tell(self, seen: Iterable[Seen], at: Seconds) -> None:
         """Tell what is new. at: loop time of the picture."""

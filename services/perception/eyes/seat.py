@@ -46,6 +46,11 @@ class SeatSeeing:
                 self.is_here = isinstance(each, PersonCame)
         return told
 
+    @property
+    def missed(self) -> tuple[str, ...]:
+        """The one at the page, if their face is followed, and was not in the latest picture."""
+        return (self._person,) if self._seeing.missed else ()
+
     def end(self) -> list[Seen]:
         """Take it that the camera looks no more: what they do with their head has ended, and nobody has gone."""
         return [each for each in self._named(self._seeing.end()) if not isinstance(each, PersonGone)]

@@ -109,6 +109,11 @@ class Seeing:
         """True while a face is followed, seen in the last picture or not."""
         return self._tracker.follows
 
+    @property
+    def missed(self) -> tuple[str, ...]:
+        """People who are followed, and whose face was not in the latest picture."""
+        return tuple(face.id for face in self._tracker.named if face.at < self._at)
+
     def end(self) -> list[Seen]:
         """Let all go: nobody looks any more."""
         return [each for face in self._tracker.named for each in self._gone(face.id, face.at)]

@@ -111,7 +111,7 @@ class _Eyes:
             journal.alert(self._bus.log, "seeing again")
         at = landmarks.at.seconds
         self._bus.publish(keys.landmarks(self._bus.name), replace(landmarks, at=self._bus.stamp(at)))
-        self._people.tell(self._seeing.feed(landmarks, at), at)
+        self._people.looked(self._bus.name, self._seeing.feed(landmarks, at), self._seeing.missed, at)
 
     def _lose(self, fault: Fault) -> None:
         if not self._is_lost:

@@ -107,9 +107,15 @@ class OutsideWatching(Watching):
 
     def __init__(self, order: SourceOrder) -> None:
         self._order = order
+        self._answers: _Answers | None = None
+
+    def kill(self) -> None:
+        """Let the process end as if the system had ended it, for a check of what follows."""
+        if self._answers is not None:
+            self._answers.kill()
 
     async def watch(self) -> AsyncGenerator[FaceLandmarks | None, None]:
-        answers = _Answers(self._order)
+        answers = self._answers = _Answers(self._order)
         try:
             answer = await answers.next(OPENING)
             if isinstance(answer, SourceEnded):
@@ -153,6 +159,10 @@ class _Answers:
     def take_more(self) -> None:
         """Let it look at one more picture."""
         self._child.write(packed_message(PictureTaken()))
+
+    def kill(self) -> None:
+        """End the process as the system would."""
+        self._child.kill()
 
     def close(self) -> None:
         """End the process."""

@@ -105,19 +105,21 @@ class Gazes(KindRecognizer):
 
     @property
     def face(self) -> str:
-        """Actor whose face the person looks at; "": none."""
-        return next(filter(self._scene.is_face, self.gaze.targets), "")
+        """Actor whose face the person looks at; "": none, or one of several."""
+        faces = [*filter(self._scene.is_face, self.gaze.targets)]
+        return faces[0] if faces and not (self.gaze.one_of and len(faces) > 1) else ""
 
     def gaze_changed(self, at: Seconds) -> None:
-        confidence = self.gaze.confidence
+        sureness = self.gaze.sureness
         robot_on = self._scene.robot_looks_at((self.id,))
+        confidence = sureness((self._scene.robot,))
         self.facial.gazes(robot_on=robot_on, human_on=self.on_robots_face, at=at, confidence=confidence)
         for one in self.directed:
             human_on = self._scene.person_looks_at(self.gaze, one.objects)
             if human_on and one.event is not None and one.event.cause != "human":
                 self.gaze.spent = True
             robot_on = self._scene.robot_looks_at(one.objects)
-            one.gazes(robot_on=robot_on, human_on=human_on, at=at, confidence=confidence)
+            one.gazes(robot_on=robot_on, human_on=human_on, at=at, confidence=sureness(one.objects))
         self._forget_idle(at)
         for past in self._robot_directed:
             if self._scene.person_looks_at(self.gaze, past.objects) and self._is_recent(past, at):
@@ -144,7 +146,7 @@ class Gazes(KindRecognizer):
         if not self.on_robots_face or self.facial.state != IDLE:
             return
         limit = self._config.mutual_facial_gaze_limit
-        event = self._by_human("mutual_facial_gaze", at, limit, self.gaze.confidence)
+        event = self._by_human("mutual_facial_gaze", at, limit, self.gaze.sureness((self._scene.robot,)))
         in_vain, robot_since = self._scene.fragment_looks_elsewhere((self.id,)), self._scene.robot_since((self.id,))
         self.facial.human_begins(event, limit, robot_since=robot_since, human_on=True, in_vain=in_vain, at=at)
 
@@ -152,14 +154,17 @@ class Gazes(KindRecognizer):
         """Begin a directed gaze by a look that has lasted long enough."""
         self.gaze.spent = True
         objects = tuple(filter(self._scene.is_object, self.gaze.targets))
-        self._human_directs(objects, at - DIRECT_BY_LOOK, at, self.gaze.confidence)
+        self._human_directs(objects, at - DIRECT_BY_LOOK, at, self.gaze.sureness(objects), one_of=self.gaze.one_of)
 
-    def _human_directs(self, objects: tuple[str, ...], since: Seconds, at: Seconds, confidence: Probability) -> None:
+    def _human_directs(
+        self, objects: tuple[str, ...], since: Seconds, at: Seconds, confidence: Probability, *, one_of: bool = False
+    ) -> None:
         """Begin a directed gaze. since: start of the pointing, or of the look that has become a direction at `at`."""
         if any(set(one.objects) & set(objects) for one in self.directed):
             return
         limit = self._config.directed_gaze_limit
         event = self._by_human("directed_gaze", since, limit, confidence, objects)
+        event.one_of = one_of and len(objects) > 1
         in_vain = self._scene.fragment_looks_elsewhere(objects)
         robot_since = self._scene.robot_since(objects)
         if robot_since is not None or not in_vain:

@@ -92,6 +92,8 @@ class OngoingEvent(Struct, kw_only=True):
     responder: str
     started: Seconds
     objects: tuple[str, ...] = ()
+    one_of: bool = False
+    """It is about one of the objects, and it is not known which."""
     cause: Cause = "human"
     optional: bool = False
     limit: Seconds | None = None
@@ -175,8 +177,9 @@ class EventWriter:
         told = ConnectionEvent(
                 id=event.id, kind=event.kind, initiator=event.initiator, responder=event.responder, state=state,
                 at=Stamp(self._clock, at), started=Stamp(self._clock, event.started), objects=event.objects,
-                cause=event.cause, optional=event.optional, delay=event.delay if knows_delay else None,
-                duration=event.duration if ends else None, limit=event.limit if begins else None,
+                one_of=event.one_of, cause=event.cause, optional=event.optional,
+                delay=event.delay if knows_delay else None, duration=event.duration if ends else None,
+                limit=event.limit if begins else None,
                 response=None if begins else event.response, answered_by=event.answered_by,
                 confidence=event.confidence, block=event.block, behavior=event.behavior, turn=event.turn,
                 words=self._words_of(event) if event.spoken else "",

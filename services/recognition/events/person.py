@@ -141,7 +141,7 @@ class PersonRecognition:
         action = began.action
         if action == "look":
             was_on_face = self.gazes.on_robots_face
-            if self.gaze.begin(began.targets, at, began.confidence):
+            if self.gaze.begin(began.targets, at, began.confidence, one_of=began.one_of):
                 self.gaze_changed(at)
                 if not was_on_face:
                     self.gazes.seeks_face(at)
@@ -173,7 +173,7 @@ class PersonRecognition:
             if self.gaze.targets and since < self.gaze.since:
                 return  # there is a newer one
             since = max(since, self.gaze.since)
-            if self.gaze.begin(targets, since, began.confidence):
+            if self.gaze.begin(targets, since, began.confidence, one_of=began.one_of):
                 self.gaze.spent = True
                 self.gaze_changed(since)
         elif action not in self._doing:

@@ -97,10 +97,14 @@ class GazeState(Struct):
     since: Seconds = 0.0
     ended: Seconds = inf
     confidence: Probability = 1.0
+    one_of: bool = False
+    """True if it is at one of the targets, and it is not known at which."""
     spent: bool = False
     """True if this look answers the robot, or has directed it already: it does not direct it (again)."""
 
-    def begin(self, targets: tuple[str, ...], at: Seconds, confidence: Probability = 1.0) -> bool:
+    def begin(
+        self, targets: tuple[str, ...], at: Seconds, confidence: Probability = 1.0, *, one_of: bool = False
+    ) -> bool:
         """Begin a look at `targets`. True if that is a change; a look older than the present one is ignored."""
         if at < self.since:
             return False
@@ -108,8 +112,13 @@ class GazeState(Struct):
             self.ended = inf
             return False
         self.targets, self.since, self.ended, self.spent = targets, at, inf, False
-        self.confidence = confidence
+        self.confidence, self.one_of = confidence, one_of
         return True
+
+    def sureness(self, entities: tuple[str, ...]) -> Probability:
+        """Confidence that the look is at one of these: of a look at one of several each has its part."""
+        meant = sum(target in entities for target in self.targets)
+        return self.confidence * meant / len(self.targets) if self.one_of and meant else self.confidence
 
     def end(self, targets: tuple[str, ...], at: Seconds) -> None:
         """End the look at `targets`; effective only if the same look does not begin again at once."""

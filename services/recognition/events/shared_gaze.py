@@ -89,7 +89,7 @@ class SharedGaze(Machine):
             self._asked = _Asked(event, clock)
         else:
             self._close("supersede", at)
-            self._confidence = 1.0 if look is None else look.confidence
+            self._confidence = 1.0 if look is None else look.sureness(event.objects or (event.initiator,))
             if robot_on:
                 clock.show(at)
             self._begin(event, clock, by_robot=True, robot_on=robot_on, human_on=look is not None)

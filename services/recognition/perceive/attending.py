@@ -10,11 +10,15 @@ tells the engaged from the disengaged, and one of 10 finds neither). So the cone
 a habit: a head that keeps still for a second in the sure part of the cone, and is on nothing else, attends; its mean
 offset is learned. From then on this head attends when it points anywhere between the robot's face and the learned
 offset, or a little beside. That is less than the wide cone to all other sides, and more to the one of the habit.
+
+Where it is known from elsewhere what somebody looks at, the habit is not guessed but measured (`sure_looks.py`): what
+is told of looks at the robot is its habit, too, and all other looks are mended by it.
 """
 
 import math
 
 from engage_hri.schemas.units import Degrees, Probability, Seconds
+from engage_hri.services.recognition.perceive.sure_looks import Angles, SureLooks
 
 FULL_ATTENTION: Degrees = 20.0
 """Angle between a head and the line to the robot's face up to which the head attends to it, by these recordings, as
@@ -37,7 +41,7 @@ HABIT_MEMORY: Seconds = 20.0
 """Time of keeping still over which the habit is the mean: it changes slowly, with the person's posture."""
 LONGEST_STEP: Seconds = 0.5
 """Time from one pose to the next for which the head is taken to have kept still."""
-Offset = tuple[Degrees, Degrees]
+Offset = Angles
 
 
 def attention(angle: Degrees, full: Degrees = FULL_ATTENTION, none: Degrees = NO_ATTENTION) -> Probability:
@@ -51,6 +55,8 @@ class Attending:
     def __init__(self) -> None:
         self.habit: Offset = (0.0, 0.0)
         """Mean offset of the head while it surely attended, no longer than `FULL_ATTENTION`."""
+        self.sure = SureLooks()
+        """Looks of which it is known at what they are."""
         self._learned_for: Seconds = 0.0
         """Time of keeping still from which the habit is known."""
         self._anchor: Offset | None = None
@@ -63,10 +69,12 @@ class Attending:
         offset: of the robot's face, seen from the head. at: of the pose. is_free: the gaze is on nothing else.
         """
         self._learn(offset, at, is_free=is_free)
-        known = min(1.0, self._learned_for / LEARNED_AFTER)
+        measured = self.sure.at_robot
+        known = 1.0 if measured else min(1.0, self._learned_for / LEARNED_AFTER)
+        habit = measured or self.habit
         full = FULL_ATTENTION + known * (FULL_BESIDE - FULL_ATTENTION)
         none = NO_ATTENTION + known * (NONE_BESIDE - NO_ATTENTION)
-        return attention(_beside(offset, (known * self.habit[0], known * self.habit[1])), full, none)
+        return attention(_beside(offset, (known * habit[0], known * habit[1])), full, none)
 
     def _learn(self, offset: Offset, at: Seconds, *, is_free: bool) -> None:
         step, self._judged_at = at - self._judged_at, at

@@ -2,9 +2,14 @@
 
 An angle is measured to the thing's extent: 0 when the gaze goes through its footprint, or the sphere of its radius.
 A covered thing stays where it was last seen, with a confidence that decays (thesis 5.4.2).
+
+Of a direction whose deviation is stated, each thing is as likely as it would be to find a head so that looks at it,
+and so is that it looks at none. What is not likely enough to be named alone is named with its rivals, as one of them
+(decision 0238).
 """
 
 import math
+from collections.abc import Mapping
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
@@ -20,19 +25,39 @@ ROBOT_FACE: Vector = (0.05, 0.0, 1.17)
 MEMORY: Seconds = 10.0
 """Time in which the confidence in the place of a covered thing halves. Ours."""
 Targets = tuple[str, ...]
+Spread = tuple[Radians, Radians]
+"""Standard deviations of a direction, to the side and up."""
 AWAY: Targets = ()
 SURFACE = "table"
 """Id of the surface that a thing lies on when none is seen under it."""
+NOTHING = 4e-4
+"""Likelihood of a look at no thing, for each square degree: as often as at each thing, somewhere in 50 by 50 degrees.
+Of deviations of 3 and 5 degrees a thing is as likely up to 2.5 of them beside the gaze, of larger ones up to less."""
+FACE = 5.0
+"""How many times as likely a look at a face is as one at a thing: who talks looks at faces."""
+FARTHEST_OFF = 3.5
+"""Deviations from the gaze up to which anything is asked how likely it is."""
+LEAST_SPREAD: Radians = 0.02
+"""Least deviation that is believed of a gaze: eyes wander on what they look at."""
+SURE: Probability = 0.9
+"""Share of all likelihood that what is named has together."""
+ALONE: Probability = 0.95
+"""Share from which on a thing is named alone; once it is, `SURE` is enough."""
+KEPT: Probability = 0.75
+"""Share with which what was named before stays: less than `SURE`, that a look between two things does not flutter."""
+MOST_NAMED = 3
+"""Things that are named together at most. Of more, it is what they lie on that is looked at."""
 SAME_ANGLE: Radians = 1e-6
 """Resolution of angles: where they are equal, the nearer thing is in front."""
 ROUNDING: Meters = 1e-9
 
 
 class GazeTarget(NamedTuple):
-    """Targets of a gaze, and the confidence that it is on them."""
+    """Targets of a gaze, and the confidence that it is on them. one_of: on one of them, it is not known on which."""
 
     targets: Targets
     confidence: Probability
+    one_of: bool = False
 
 
 class _Thing:
@@ -74,15 +99,12 @@ class _Gaze:
     """A ray from the eyes; the coordinates of what is in front, in units of its depth, across the ray."""
 
     def __init__(self, eye: Vector, direction: Vector) -> None:
-        longest = max(map(abs, direction))
-        scaled = [part / longest for part in direction]
-        length = math.hypot(*scaled)
         self.eye = eye
-        self.axis = x, y, z = scaled[0] / length, scaled[1] / length, scaled[2] / length
-        # Two axes across the gaze, made from the axis of the world that is least along it.
-        side = (0.0, -z, y) if abs(x) <= min(abs(y), abs(z)) else (z, 0.0, -x) if abs(y) <= abs(z) else (-y, x, 0.0)
+        self.axis = x, y, z = unit(direction)
+        # Two axes across the gaze, to its left and up; straight up and down any will do.
+        side = (-y, x, 0.0) if max(abs(x), abs(y)) > 1e-9 else (0.0, 1.0, 0.0)
         length = math.hypot(*side)
-        self._right = a, b, c = side[0] / length, side[1] / length, side[2] / length
+        self._left = a, b, c = side[0] / length, side[1] / length, side[2] / length
         self._up = (y * c - z * b, z * a - x * c, x * b - y * a)
 
     def across(self, place: Vector) -> tuple[float, float] | None:
@@ -91,13 +113,13 @@ class _Gaze:
         depth = _dot(from_eye, self.axis)
         if depth <= 1e-9:
             return None
-        return _dot(from_eye, self._right) / depth, _dot(from_eye, self._up) / depth
+        return _dot(from_eye, self._left) / depth, _dot(from_eye, self._up) / depth
 
     def angle_to(self, thing: _Thing) -> Radians:
         """Angle from the ray to the nearest point of the thing."""
-        corners = [self.across(corner) for corner in thing.outline]
-        if corners and None not in corners:
-            return _to_polygon([corner for corner in corners if corner is not None])
+        corners = self._corners(thing)
+        if corners:
+            return math.atan(_to_polygon(corners))
         center = thing.entity.position
         distance = math.dist(center, self.eye)
         if distance <= thing.radius:
@@ -105,6 +127,27 @@ class _Gaze:
         along = _dot(_minus(center, self.eye), self.axis)
         angle = math.acos(max(-1.0, min(1.0, along / max(distance, 1e-9))))
         return max(0.0, angle - math.asin(thing.radius / max(distance, 1e-9)))
+
+    def likelihood(self, thing: _Thing, spread: Spread) -> float:
+        """Likelihood of this direction, for each square degree, of one who looks anywhere at the thing."""
+        corners = self._corners(thing)
+        if not corners:
+            center = self.across(thing.entity.position)
+            if center is None:
+                return 0.0
+            reach = math.tan(math.asin(min(0.99, thing.radius / math.dist(thing.entity.position, self.eye))))
+            corners = [(center[0] - reach, center[1] - reach), (center[0] + reach, center[1] + reach)]
+        found = 1.0
+        for sides, each in zip(zip(*corners, strict=True), spread, strict=True):
+            low, high = (math.degrees(math.atan(side)) for side in (min(sides), max(sides)))
+            found *= _share_between(low, high, math.degrees(max(each, LEAST_SPREAD)))
+        return found
+
+    def _corners(self, thing: _Thing) -> list[tuple[float, float]]:
+        """Corners of the thing's outline across the ray; none: it has none, or one of them is behind."""
+        corners = [self.across(corner) for corner in thing.outline]
+        seen = [corner for corner in corners if corner is not None]
+        return seen if len(seen) == len(corners) else []
 
     def meets(self, surface: _Thing) -> bool:
         """True if the ray goes through the surface's footprint."""
@@ -157,6 +200,22 @@ class GazeTargets:
         else:
             self._spheres = None
 
+    def place(self, id: str) -> Vector | None:
+        """Place of what a gaze can be on; None: it is not known."""
+        thing = self._known.get(id)
+        return None if thing is None else thing.entity.position
+
+    def beside_robot(self, eyes: Vector, direction: Vector) -> Offset:
+        """Angles of a direction to the left and up of the line from these eyes to the robot's face."""
+        there, (left, up) = _bearing(direction), _bearing(_minus(self._known[self._robot].entity.position, eyes))
+        return math.remainder(there[0] - left, 360.0), there[1] - up
+
+    def towards(self, eyes: Vector, beside: Offset) -> Vector:
+        """Direction with these angles (`beside_robot`)."""
+        left, up = _bearing(_minus(self._known[self._robot].entity.position, eyes))
+        left, up = math.radians(left + beside[0]), math.radians(max(-90.0, min(90.0, up + beside[1])))
+        return math.cos(left) * math.cos(up), math.sin(left) * math.cos(up), math.sin(up)
+
     def offset_of_robot(self, gaze: tuple[Vector, Vector]) -> Offset:
         """Offset of the robot's face from the direction of a gaze. gaze: place of the eyes, and direction."""
         ray, face = _Gaze(*gaze), self._known[self._robot].entity.position
@@ -189,17 +248,27 @@ class GazeTargets:
         return _Thing(entity)
 
     def target(
-        self, looker: str, gaze: tuple[Vector, Vector], *, present: Targets | None, at: Seconds, sure: Probability
+        self,
+        looker: str,
+        gaze: tuple[Vector, Vector],
+        *,
+        present: Targets | None,
+        at: Seconds,
+        sure: Probability,
+        spread: Spread | None = None,
     ) -> GazeTarget:
-        """Target of `looker`'s gaze: the nearest by angle in the cone, else the surface it meets, else `AWAY`.
+        """Target of `looker`'s gaze: what is likely enough, or the nearest by angle in the cone where no deviation
+        is stated; else the surface it meets, else `AWAY`.
 
         gaze: place of the eyes and direction. present: target before, which stays unless another thing is nearer by
-        the margin. sure: confidence of the pose.
+        the margin. sure: confidence of the pose. spread: deviations of the direction, if they are stated.
         """
         ray = _Gaze(*gaze)
+        if spread is not None:
+            return self._likely(looker, ray, spread, present=present or AWAY, at=at, sure=sure)
         found: list[_Candidate] = []
         nearest = self._half_angle
-        for least, _, thing in self._around(ray):
+        for least, _, thing in self._around(ray, self._half_angle + self._margin):
             if least > nearest + self._margin:
                 break
             confidence = sure * self._confidence(thing, at)
@@ -216,20 +285,62 @@ class GazeTargets:
             kept = min((one for one in found if one.targets == present), default=best)
             best = kept if kept.angle - best.angle < self._margin else best
             return GazeTarget(best.targets, best.confidence)
+        return self._beneath(ray, at, sure)
+
+    def _beneath(self, ray: _Gaze, at: Seconds, sure: Probability) -> GazeTarget:
+        """The surface that a gaze meets, or `AWAY`."""
         for surface in self._surfaces:
             confidence = sure * self._confidence(surface, at)
             if confidence >= self._least and ray.meets(surface):
                 return GazeTarget((surface.entity.id,), confidence)
         return GazeTarget(AWAY, sure)
 
-    def _around(self, gaze: _Gaze) -> list[tuple[Radians, int, _Thing]]:
+    def _likely(
+        self, looker: str, ray: _Gaze, spread: Spread, *, present: Targets, at: Seconds, sure: Probability
+    ) -> GazeTarget:
+        """Target of a gaze with a stated deviation: the fewest things of which one is `SURE` to be looked at."""
+        likely: dict[str, float] = {}
+        surest: Probability = 0.0
+        for _, _, thing in self._around(ray, min(FARTHEST_OFF * max(*spread, LEAST_SPREAD), 1.5)):
+            seen = sure * self._confidence(thing, at)
+            if seen >= self._least and thing.entity.id != looker:
+                name = self._reported(thing.entity)
+                weight = FACE if thing.entity.kind == "person" else 1.0
+                likely[name] = likely.get(name, 0.0) + weight * ray.likelihood(thing, spread)
+                surest = max(surest, seen)
+        beneath = self._beneath(ray, at, sure)
+        whole = sum(likely.values()) + NOTHING
+        if whole <= 2 * NOTHING:
+            return beneath._replace(confidence=beneath.confidence * NOTHING / whole)
+        for name in beneath.targets:
+            likely[name] = likely.get(name, 0.0) + NOTHING
+        named, share = _fewest(likely, whole)
+        before = sum(likely.get(name, 0.0) for name in present) / whole
+        if before >= (SURE if len(present) == 1 else KEPT) and len(named) > 1:
+            named, share = [*present], before
+        if len(named) > MOST_NAMED:
+            on = dict[str, float]()
+            for name, much in likely.items():
+                surface = self._surface_of(name) or name
+                on[surface] = on.get(surface, 0.0) + much
+            named, share = _fewest(on, whole, alone=SURE)
+        return GazeTarget(tuple(sorted(named)), surest * share, len(named) > 1)
+
+    def _surface_of(self, id: str) -> str:
+        """The surface that a thing lies on; empty: none, it is a face, or a surface itself."""
+        thing = self._known.get(id)
+        if thing is None or thing.entity.kind != "object":
+            return ""
+        x, y, _ = thing.entity.position
+        return next((surface.entity.id for surface in self._surfaces if surface.is_under(x, y)), SURFACE)
+
+    def _around(self, gaze: _Gaze, half: Radians) -> list[tuple[Radians, int, _Thing]]:
         """Things that may be in the cone, as (least possible angle, number, thing), in order."""
         if self._spheres is None:
             self._surfaces = [thing for thing in self._known.values() if thing.entity.kind == "surface"]
             others = [thing for thing in self._known.values() if thing.entity.kind != "surface"]
             self._spheres = {thing.entity.id: (*thing.entity.position, thing.bound, thing) for thing in others}
         (eye_x, eye_y, eye_z), (right, up, ahead) = gaze.eye, gaze.axis
-        half = self._half_angle + self._margin
         cos_square, sin, near = math.cos(half) ** 2, math.sin(half), []
         for number, (x, y, z, bound, thing) in enumerate(self._spheres.values()):
             x, y, z = x - eye_x, y - eye_y, z - eye_z
@@ -253,10 +364,7 @@ class GazeTargets:
 
     def _reported(self, entity: Entity) -> str:
         """Id to report for the entity: at resolution `table` that of the surface on which an object lies."""
-        if entity.kind != "object" or not self._by_table:
-            return entity.id
-        x, y, _ = entity.position
-        return next((surface.entity.id for surface in self._surfaces if surface.is_under(x, y)), SURFACE)
+        return (self._surface_of(entity.id) if self._by_table else "") or entity.id
 
 
 def _dot(a: Vector, b: Vector) -> float:
@@ -265,6 +373,12 @@ def _dot(a: Vector, b: Vector) -> float:
 
 def _minus(a: Vector, b: Vector) -> Vector:
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _bearing(direction: Vector) -> Offset:
+    """Angles of a direction: to the left of ahead, and up."""
+    x, y, z = unit(direction)
+    return math.degrees(math.atan2(y, x)), math.degrees(math.atan2(z, math.hypot(x, y)))
 
 
 def _is_inside(corners: list[tuple[float, float]]) -> bool:
@@ -276,8 +390,25 @@ def _is_inside(corners: list[tuple[float, float]]) -> bool:
     return inside
 
 
+def _fewest(likely: Mapping[str, float], whole: float, alone: Probability = ALONE) -> tuple[list[str], Probability]:
+    """The fewest names that have together `SURE` of all likelihood, or the one that has `alone`; and their share."""
+    named, share = list[str](), 0.0
+    for name in sorted(likely, key=lambda name: (-likely[name], name)):
+        if share < (alone if len(named) == 1 else SURE):
+            named.append(name)
+            share += likely[name] / whole
+    return named, share
+
+
+def _share_between(low: float, high: float, spread: float) -> float:
+    """Density at 0 of what falls with a deviation around a place that is anywhere between two."""
+    width = max(high - low, 1e-3)
+    far, near = (math.erf(side / (spread * math.sqrt(2))) for side in (high, low))
+    return (far - near) / (2 * width)
+
+
 def _to_polygon(corners: list[tuple[float, float]]) -> Radians:
-    """The angle whose tangent is the distance of (0, 0) from the polygon, 0 inside."""
+    """Distance of (0, 0) from the polygon, 0 inside."""
     if _is_inside(corners):
         return 0.0
     nearest = math.inf
@@ -286,7 +417,15 @@ def _to_polygon(corners: list[tuple[float, float]]) -> Radians:
         square = dx * dx + dy * dy
         s = 0.0 if square == 0.0 else max(0.0, min(1.0, -(x * dx + y * dy) / square))
         nearest = min(nearest, math.hypot(x + s * dx, y + s * dy))
-    return math.atan(nearest)
+    return nearest
+
+
+def unit(vector: Vector) -> Vector:
+    """The vector with length 1. It is not 0."""
+    longest = max(map(abs, vector))
+    x, y, z = (part / longest for part in vector)
+    length = math.hypot(x, y, z)
+    return x / length, y / length, z / length
 
 
 def is_direction(vector: Vector) -> bool:

@@ -23,6 +23,7 @@ class Change(NamedTuple):
     at: Seconds
     targets: Targets = ()
     confidence: Probability = 1.0
+    one_of: bool = False
 
 
 class _Candidate(NamedTuple):
@@ -69,9 +70,9 @@ class Looking:
         if settled or (self._left is not None and at - self._left >= DWELL - ROUNDING):
             changes += self.end(at)
         if settled:
-            (targets, self._confidence), since = self._candidate
+            (targets, self._confidence, one_of), since = self._candidate
             self.target, self._candidate = targets, None
-            changes.append(Change(True, "look", since, targets, self._confidence))
+            changes.append(Change(True, "look", since, targets, self._confidence, one_of))
         return changes
 
     def end(self, at: Seconds) -> list[Change]:

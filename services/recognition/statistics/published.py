@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Set
 from functools import partial
 from math import inf, isfinite
 
-from engage_hri.schemas.recognition import ConnectionEvent, PersonContact, Statistics
+from engage_hri.schemas.recognition import ConnectionEvent, HeadHabit, PersonContact, Statistics
 from engage_hri.schemas.units import Probability, Seconds, Stamp
 from engage_hri.services.bus.deadlines import Deadlines
 from engage_hri.services.recognition.config import RecognitionConfig
@@ -31,6 +31,7 @@ class _ActorStatistics:
     def __init__(self, config: RecognitionConfig, clock: str, robot: str) -> None:
         self.tally = EventTally(config.window, clock)
         self.engagement = Engagement(config, self.tally, robot)
+        self.head: HeadHabit | None = None
         self.told_at: Seconds = -inf
         self.is_new = False
         """True if something has changed since it was told."""
@@ -86,11 +87,16 @@ class PublishedStatistics:
         busy: Set[str],
         now: Seconds,
         contacts: Mapping[str, Probability | None] = {},
+        heads: Mapping[str, HeadHabit] = {},
     ) -> None:
         """Count changes, in their order.
 
         busy: persons with a task in hand. contacts: how much of a contact there is now, where that may have changed.
+        heads: what is known of people's heads, where that has changed.
         """
+        for actor, head in heads.items():
+            self._actors[actor].head, self._actors[actor].is_new = head, True
+            self._changed.add(actor)
         for actor, much in contacts.items():
             one = self._actors[actor]
             one.held_until = inf
@@ -122,6 +128,7 @@ class PublishedStatistics:
         name, until = former.actor, now + self._config.window
         one = self._actors[name]
         one.tally.resume(former.session)
+        one.head = former.head
         one.engagement.resume(former)
         one.held_until = until
         if former.busy and name != TOGETHER:
@@ -147,6 +154,7 @@ class PublishedStatistics:
                 before.engagement.touch(one.engagement.contact.now, now)
                 one, before = before, one
             one.tally.join(before.tally)
+            one.head = one.head or before.head
         self._actors[kept] = one
         one.is_new = one.is_urgent = True
         self._changed.add(kept)
@@ -203,7 +211,7 @@ class PublishedStatistics:
             actor=actor, at=Stamp(self._clock, now), session=one.tally.session(), recent=one.tally.recent(now),
             engagement=estimate.value, level=estimate.level, reasons=estimate.reasons, busy=busy,
             busy_until=self._stamp(engagement.busy_until), level_since=self._stamp(engagement.level_since),
-            contact=contact,
+            contact=contact, head=one.head,
         )  # fmt: skip
 
     def _stamp(self, at: Seconds) -> Stamp | None:

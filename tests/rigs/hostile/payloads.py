@@ -38,6 +38,7 @@ from engage_hri.schemas.perception import (
     ActorFound,
     ActorLost,
     HeadPose,
+    Looked,
     OngoingActions,
     Utterance,
     VoiceActivity,
@@ -151,6 +152,8 @@ class Payloads:
                 return self._chance.choice((perceived, keys.ROBOT_ONGOING))
             case HeadPose(actor=actor):
                 return keys.head_pose(_chunk(actor))
+            case Looked():
+                return keys.looked("eyes")
             case VoiceActivity(actor=actor):
                 return keys.voice_activity(_chunk(actor))
             case SoundFrame():
