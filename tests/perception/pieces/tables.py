@@ -170,7 +170,19 @@ def layout(rng: np.random.Generator) -> dict[str, Pose]:
             continue
         for _ in range(500):
             pose = (float(rng.uniform(0.36, 0.80)), float(rng.uniform(-0.40, 0.40)), float(rng.uniform(-np.pi, np.pi)))
-            if all(math.dist(pose[:2], other[:2]) > 0.115 for other in poses.values()):
+            shown = Eye()(np.column_stack([corners(id, pose), np.full(len(FOOTPRINTS[id]), TOP)]))
+            if (shown.min(0) < 10).any() or (shown.max(0) > [1270, 710]).any():
+                continue  # beyond the edge of the picture
+            if all(_apart(id, pose, other, where) > 0.012 for other, where in poses.items()):
                 poses[id] = pose
                 break
     return poses
+
+
+def _apart(id: str, pose: Pose, other: str, where: Pose) -> float:
+    """Distance of two pieces, at their outlines."""
+    a, b = corners(id, pose), corners(other, where)
+    if cv2.intersectConvexConvex(a.astype(np.float32), b.astype(np.float32))[0] > 0:
+        return 0.0
+    dense = [np.concatenate([np.linspace(p, q, 12) for p, q in zip(c, np.roll(c, -1, 0), strict=True)]) for c in (a, b)]
+    return float(np.linalg.norm(dense[0][:, None] - dense[1], axis=2).min())

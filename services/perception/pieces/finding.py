@@ -1,0 +1,425 @@
+"""Pieces in one picture of a table: which pixels have which color, and where the forms lie that have it.
+
+The picture is laid out flat, as if seen from straight above at the height of the tops of the pieces. Light is not what
+it was when the colors were learned: it is brighter or darker, of another tint, uneven, and pieces and hands throw
+shadows. So each pixel is compared with the colors as they would look under the light that the table has around it, in
+shadows of several depths, and as a camera clips what is too bright. What is like none of them (a sleeve, a hand) says
+nothing: it covers.
+
+A form is laid wherever much of its color is (all turns, on a coarse lattice), and then moved until its edges lie on
+the edges in the picture. There each edge has the colors on both of its sides to compare, whatever the light. A piece
+has walls: those that look at the camera are seen below its top. So an edge on that side may be found in two places,
+and the other edges say in which. What the edges leave open is the doubt; a piece of which too little is seen to say
+where it lies is not told.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from engage_hri.schemas.tables import Form, TaskTable
+from engage_hri.schemas.units import Meters, Probability, Radians
+from engage_hri.services.perception.eyes.camera import StatedCamera
+from engage_hri.services.perception.eyes.looking import Floats
+
+Image = NDArray[np.uint8]
+Labels = NDArray[np.int8]
+Palette = dict[str, tuple[float, float, float]]
+"""Red, green and blue of each color, and of the table, under the same light."""
+TABLE = "table"
+STEP: Meters = 0.0015
+"""Size of a pixel of the table that is laid out flat."""
+MARGIN: Meters = 0.02
+UNKNOWN = -1
+SHADES = (1.15, 1.0, 0.86, 0.74, 0.63, 0.54, 0.46, 0.4, 0.34)
+"""Light of a pixel, as shares of that around it."""
+NOISE, TINT = 6.0, 0.07
+"""Deviation of a pixel from its color: of 255, and as a share."""
+FAR = 3.0
+"""Deviations from which on a pixel has none of the colors."""
+SKIP = 4
+"""Pixels between the places of the lattice."""
+PAD = 80
+"""Pixels around a picture in which nothing is, so that forms may reach over its edge."""
+TURN: Radians = math.radians(15.0)
+SPACING: Meters = 0.003
+"""Distance of the points of an edge at which the picture is compared on both sides."""
+REACH: Meters = 0.006
+"""Distance to which an edge is looked for."""
+SIDE: Meters = 0.003
+"""Length over which the color beside an edge is taken."""
+CLEAR: Meters = 0.0015
+"""Distance from an edge within which colors of both sides mix."""
+TOLERANCE: Meters = 0.001
+"""Residual from which on a point of an edge counts less: half as much here."""
+CORRELATED = 3.0
+"""How many points of an edge err alike: what blurs a picture, and grains of a table, are larger than `SPACING`."""
+ROUNDS = 7
+UNEVEN = 0.15
+"""Share by which the brightness of a piece's wall differs from that of its top."""
+LEAST_SEEN, MOST_FOREIGN, MOST_BEYOND = 0.35, 0.2, 0.45
+"""Share of a form that must have its color, that may have another, and of its surroundings that may have its color."""
+PLACE_KNOWN: Meters = 0.002
+TURN_KNOWN: Radians = math.radians(3.0)
+"""Standard deviations of place and turn from which on it is not known where a piece lies."""
+
+
+class FoundPiece(NamedTuple):
+    """A piece in a picture. seen: share of it that is in view. spread, turn_spread: standard deviations."""
+
+    id: str
+    x: Meters
+    y: Meters
+    yaw: Radians
+    seen: Probability
+    spread: Meters
+    turn_spread: Radians
+
+
+class _Laid(NamedTuple):
+    """A form at a place. score: how well it explains the colors there."""
+
+    pose: Floats
+    score: float
+    seen: float = 0.0
+    support: float = 0.0
+    spread: float = math.inf
+    turn_spread: float = math.inf
+
+
+class FlatTable:
+    """A table before a camera: pictures of it are laid out flat, pixels of `STEP`, rows along x, columns along y."""
+
+    def __init__(self, table: TaskTable, camera: StatedCamera, eye: Sequence[float], width: int, height: int) -> None:
+        """eye: place of the camera. width, height: of its pictures."""
+        x, y, z = table.surface.center
+        corners = np.array(table.surface.footprint) + [x, y]
+        self.low = corners.min(0) - MARGIN
+        self.rows, self.columns = (int(n) for n in np.ceil((corners.max(0) + MARGIN - self.low) / STEP))
+        top = z + table.thickness
+        square = np.array([[0, 0], [self.columns, 0], [self.columns, self.rows], [0, self.rows]], np.float32)
+        places = np.column_stack([square[:, ::-1] * STEP + self.low, np.full(4, top)])
+        pixels = camera.pixels(places, width, height)
+        # OpenCV counts pixels by their middles.
+        self._map = cv2.getPerspectiveTransform(square - np.float32(0.5), (pixels - 0.5).astype(np.float32))
+        self.is_table = np.zeros((self.rows, self.columns), np.uint8)
+        cv2.fillConvexPoly(self.is_table, np.rint(self.at(corners)[:, ::-1]).astype(np.int32), 1)
+        self.eye = np.array(eye[:2], float)
+        self.sunk = (eye[2] - top) / (eye[2] - z)
+        """Scale about the eye that brings an outline on the table to where the plane of the tops shows it."""
+
+    def laid_out(self, image: Image) -> NDArray[np.float32]:
+        """The table in a picture, from above. Zero beside the table, and where the picture does not reach."""
+        soft = cv2.GaussianBlur(image, (0, 0), 0.8)
+        shape = (self.columns, self.rows)
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        flat = cv2.warpPerspective(soft, self._map, shape, flags=flags)
+        return np.asarray(flat * self.is_table[..., None], np.float32)
+
+    def at(self, points: Floats) -> Floats:
+        """Rows and columns of places on the table, with their fractions."""
+        return (points - self.low) / STEP
+
+
+def light(flat: NDArray[np.float32], table: Sequence[float]) -> NDArray[np.float32]:
+    """Light around each pixel, by color, as a share of that under which the table had its color."""
+    ratio = cv2.blur(flat, (5, 5))[::4, ::4] / np.array(table, np.float32)
+    seen = ratio.min(2) > 0.02
+    overall = np.median(ratio[seen], 0) if seen.any() else np.ones(3, np.float32)
+    near = (np.abs(ratio / overall - 1).max(2) < 0.2) & seen
+    weight = near.astype(np.float32)[..., None]
+    wide = 10 / STEP * 0.004  # a hand's breadth
+    total = cv2.GaussianBlur(np.concatenate([ratio * weight, weight], 2), (0, 0), wide / 4)
+    own = 0.02
+    local = (total[..., :3] + own * overall) / (total[..., 3:] + own)
+    return np.asarray(cv2.resize(local, flat.shape[1::-1], interpolation=cv2.INTER_LINEAR), np.float32)
+
+
+def labeled(flat: NDArray[np.float32], palette: Palette) -> Labels:
+    """Color of each pixel: its number in the palette, or `UNKNOWN`."""
+    names, around = [*palette], light(flat, palette[TABLE])
+    soft = cv2.GaussianBlur(flat, (0, 0), 0.8)
+    labels = np.full(flat.shape[:2], UNKNOWN, np.int8)
+    ground = _distance(soft.reshape(-1, 3), around.reshape(-1, 3), palette[TABLE]).reshape(labels.shape)
+    ground[soft.max(2) == 0] = np.inf
+    labels[ground < FAR] = names.index(TABLE)
+    rest = np.nonzero((ground > FAR / 3) & (soft.max(2) > 0))
+    pixels, lights, best = soft[rest], around[rest], np.minimum(ground[rest], FAR)
+    found = labels[rest]
+    for number, name in enumerate(names):
+        if name != TABLE:
+            distance = _distance(pixels, lights, palette[name])
+            nearer = distance < best
+            best, found = np.where(nearer, distance, best), np.where(nearer, number, found)
+    labels[rest] = found
+    return labels
+
+
+def _distance(pixels: Any, lights: Any, color: Sequence[float]) -> Any:
+    """Deviations of pixels from a color, in the shade in which it is nearest."""
+    least = np.full(len(pixels), np.inf, np.float32)
+    full = lights * np.array(color, np.float32)
+    for shade in SHADES:
+        expected = np.minimum(full * np.float32(shade), 255)
+        spread = NOISE**2 + (TINT * expected) ** 2
+        least = np.minimum(least, ((pixels - expected) ** 2 / spread).sum(1))
+    return np.sqrt(least / 3)
+
+
+class _Shape:
+    """A form, with the points at which it is compared with a picture. All in its own frame."""
+
+    def __init__(self, form: Form) -> None:
+        self.form, self.outline = form, np.array(form.footprint)
+        after = np.roll(self.outline, -1, 0)
+        along = after - self.outline
+        length = np.linalg.norm(along, axis=1, keepdims=True)
+        normals = np.column_stack([along[:, 1], -along[:, 0]]) / length
+        points, sides = [], []
+        for start, step, size, normal in zip(self.outline, along / length, length[:, 0], normals, strict=True):
+            clear = min(0.004, size / 4)
+            for way in np.linspace(clear, size - clear, max(2, round((size - 2 * clear) / SPACING) + 1)):
+                points.append(start + way * step)
+                sides.append(normal)
+        self.points, self.normals = np.array(points), np.array(sides)
+        low, high = self.outline.min(0), self.outline.max(0)
+        apart = max(0.003, math.sqrt(float(np.prod(high - low)) / 100))
+        lattice = np.stack(np.meshgrid(*(np.arange(a, b, apart) for a, b in zip(low, high, strict=True))), -1)
+        lattice = lattice.reshape(-1, 2) + apart / 2
+        depth = ((lattice[:, None] - self.outline) * normals).sum(2).max(1)
+        self.inside = lattice[depth < -0.0025]
+        self.beyond, self.beyond_normals = self.points + 0.004 * self.normals, self.normals
+        self.orders = next(n for n in (4, 3, 2, 1) if _is_symmetric(self.outline, n))
+        """How many turns of a circle look the same."""
+
+
+def _is_symmetric(outline: Floats, order: int) -> bool:
+    turned = outline @ _turning(math.tau / order)
+    return all(np.linalg.norm(self_ - turned, axis=1).min() < 0.002 for self_ in outline)
+
+
+def _turning(angle: float) -> Floats:
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, s], [-s, c]])
+
+
+class PieceFinder:
+    """Finds the pieces of a table in pictures of one camera."""
+
+    def __init__(self, table: TaskTable, flat: FlatTable, palette: Palette) -> None:
+        self._flat, self._palette = flat, palette
+        self._names = [*palette]
+        self._shapes = [_Shape(form) for form in table.pieces]
+
+    def find(self, image: Image) -> list[FoundPiece]:
+        """Find the pieces in a picture."""
+        flat = self._flat.laid_out(image)
+        labels = labeled(flat, self._palette)
+        found = []
+        for color in {shape.form.color: None for shape in self._shapes}:
+            shapes = [shape for shape in self._shapes if shape.form.color == color]
+            found += self._of_color(flat, labels, self._names.index(color), shapes)
+        return found
+
+    def _of_color(self, flat: Any, labels: Labels, number: int, shapes: Iterable[_Shape]) -> list[FoundPiece]:
+        """Find the pieces of one color: the one that explains most first; what it explains is no other's."""
+        value = np.where(labels == number, 1.0, np.where(labels == UNKNOWN, 0.0, -1.0)).astype(np.float32)
+        tops = self._tops(flat, value)
+        found = []
+        candidates: list[tuple[_Shape, _Laid]] = []
+        for shape in shapes:
+            likely = self._likely(tops, shape)
+            candidates += [(shape, self._moved(flat, value, tops, shape, each)) for each in likely]
+        while candidates:
+            shape, best = max(candidates, key=lambda each: each[1].score)
+            if best.score <= 0.3:
+                break
+            x, y, yaw = best.pose.tolist()
+            found.append(FoundPiece(shape.form.id, x, y, yaw, best.seen, best.spread, best.turn_spread))
+            self._take(value, shape, best.pose)
+            tops = np.minimum(tops, value)
+            candidates = [
+                (other, self._judged(value, tops, other, laid)) for other, laid in candidates if other is not shape
+            ]
+        return found
+
+    # -- where a form may lie ---------------------------------------------------------------------------------------
+
+    def _tops(self, flat: Any, value: Any) -> Any:
+        """Values in which walls count less than tops: most of what is seen of a piece is its top, and walls are
+        darker or brighter.
+        """
+        mask = cv2.morphologyEx((value > 0).astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+        count, numbers, boxes, _ = cv2.connectedComponentsWithStats(mask)
+        tops, tone = value.copy(), cv2.GaussianBlur(flat, (0, 0), 1.0).sum(2)
+        for number in range(1, count):
+            left, top, wide, tall, _ = boxes[number]
+            box = np.s_[top : top + tall, left : left + wide]
+            own = numbers[box] == number
+            usual = float(np.median(tone[box][own]))
+            tops[box][own & (np.abs(tone[box] - usual) > UNEVEN * usual + 3 * NOISE)] = 0.2
+        return tops
+
+    def _likely(self, value: Any, shape: _Shape, most: int = 2) -> list[Floats]:
+        """Poses on a coarse lattice in which a form explains its color best."""
+        mask = (value > 0.5).astype(np.uint8)
+        mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+        count, _, boxes, _ = cv2.connectedComponentsWithStats(mask)
+        turns = np.arange(0, math.tau / shape.orders - 1e-6, TURN)
+        padded = np.pad(value, PAD)
+        poses: list[tuple[float, Floats]] = []
+        for box in boxes[1:count]:
+            left, top, wide, tall, area = (int(each) for each in box)
+            if area * STEP**2 < 1e-4:  # a square centimetre
+                continue
+            pixels = np.stack(
+                np.meshgrid(np.arange(top, top + tall + 1, SKIP), np.arange(left, left + wide + 1, SKIP)), -1
+            ).reshape(-1, 2)
+            middle = self._flat.low + (np.array([top, left]) + np.array([tall, wide]) / 2) * STEP
+            for turn in turns:
+                rotation = _turning(turn)
+                facing = self._faces_eye(middle, shape.beyond_normals @ rotation)
+                inside = self._around(padded, pixels, shape.inside @ rotation).mean(1)
+                beyond = shape.beyond @ rotation + middle
+                beyond = np.where(facing[:, None], self._sunk(beyond), beyond) - middle
+                beyond = np.maximum(self._around(padded, pixels, beyond), 0).mean(1)
+                score = inside - beyond
+                best = int(score.argmax())
+                place = self._flat.low + (pixels[best] + 0.5) * STEP
+                poses.append((float(score[best]), np.array([*place, turn])))
+        poses.sort(key=lambda each: -each[0])
+        chosen: list[Floats] = []
+        for score, pose in poses:
+            if score < 0.1 or len(chosen) >= most * 2:
+                break
+            if all(
+                math.dist(pose[:2], other[:2]) > 0.015
+                or abs(math.remainder(pose[2] - other[2], math.tau / shape.orders)) > 1.5 * TURN
+                for other in chosen
+            ):
+                chosen.append(pose)
+        return chosen
+
+    def _around(self, padded: Any, pixels: Any, offsets: Floats) -> Any:
+        """Values at offsets around each of some pixels."""
+        rows, columns = np.rint(offsets / STEP).astype(np.int64).T + PAD
+        near = rows * padded.shape[1] + columns
+        base = pixels[:, 0].astype(np.int64) * padded.shape[1] + pixels[:, 1]
+        return padded.ravel()[base[:, None] + near]
+
+    def _faces_eye(self, points: Floats, normals: Floats) -> Any:
+        return ((self._flat.eye - points) * normals).sum(-1) > 0
+
+    def _sunk(self, points: Floats) -> Floats:
+        """Where the foot of a wall is seen whose upper edge has these points."""
+        return self._flat.eye + self._flat.sunk * (points - self._flat.eye)
+
+    def _sampled(self, value: Any, points: Floats) -> Any:
+        rows, columns = np.moveaxis(np.rint(self._flat.at(points) - 0.5).astype(np.int32), -1, 0)
+        inside = (rows >= 0) & (columns >= 0) & (rows < self._flat.rows) & (columns < self._flat.columns)
+        return np.where(inside, value[rows * inside, columns * inside], 0.0)
+
+    # -- where exactly ----------------------------------------------------------------------------------------------
+
+    def _moved(self, flat: Any, value: Any, tops: Any, shape: _Shape, pose: Floats) -> _Laid:
+        """Move a form onto the edges of the picture."""
+        information, residual = np.zeros((3, 3)), TOLERANCE
+        for round_ in range(ROUNDS):
+            rotation = _turning(pose[2])
+            points, normals = shape.points @ rotation + pose[:2], shape.normals @ rotation
+            away, weight = self._edges(flat, points, normals)
+            weight = weight / (1 + (away / (TOLERANCE * (2 if round_ < 3 else 1))) ** 2) ** 2
+            arm = points - pose[:2]
+            rows = np.column_stack([normals, normals[:, 1] * arm[:, 0] - normals[:, 0] * arm[:, 1]])
+            information = (rows * weight[:, None]).T @ rows
+            step = np.linalg.solve(information + np.diag([1e-3, 1e-3, 1e-7]), rows.T @ (weight * away))
+            pose = pose + np.clip(step, [-0.006, -0.006, -0.15], [0.006, 0.006, 0.15])
+            residual = max(0.0004, math.sqrt(float((weight * away**2).sum() / max(weight.sum(), 1e-9))))
+        covariance = np.linalg.inv(information / CORRELATED + np.diag([1e-6, 1e-6, 1e-10])) * residual**2
+        support = float(((weight > 0.1) & (np.abs(away) < 2 * TOLERANCE)).mean())
+        laid = _Laid(pose, 0.0, 0.0, support, math.sqrt(covariance[0, 0] + covariance[1, 1]), math.sqrt(covariance[2, 2]))
+        return self._judged(value, tops, shape, laid)
+
+    def _edges(self, flat: Any, points: Floats, normals: Floats) -> tuple[Floats, Floats]:
+        """Look for the edge at each point along its normal. Returns how far outside it is, and its weight."""
+        facing = self._faces_eye(points, normals)
+        sunk = self._sunk(points)
+        wall = np.where(facing, ((sunk - points) * normals).sum(1), 0.0)
+        steps = np.arange(-REACH - SIDE - CLEAR, REACH + SIDE + CLEAR + 1e-9, 0.00075)
+        offsets = steps + np.where(steps > 0, wall[:, None], 0.0) * (steps > 0)
+        # Along a wall the steps are wider, so that each profile has as many.
+        stretch = (REACH + wall)[:, None] / REACH
+        offsets = np.where(steps > 0, np.minimum(steps, REACH) * stretch + np.maximum(steps - REACH, 0), steps)
+        at = self._flat.at(points[:, None] + offsets[..., None] * normals[:, None]) - 0.5
+        profile = cv2.remap(
+            flat, at[..., 1].astype(np.float32), at[..., 0].astype(np.float32), cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_CONSTANT,
+        )  # fmt: skip
+        within = (steps < -CLEAR) & (steps > -CLEAR - SIDE)
+        without = (offsets > wall[:, None] + CLEAR) & (offsets < wall[:, None] + CLEAR + SIDE)
+        inner = profile[:, within].mean(1)
+        outer = (profile * without[..., None]).sum(1) / np.maximum(without.sum(1), 1)[:, None]
+        contrast = inner - outer
+        strength = np.linalg.norm(contrast, axis=1)
+        share = ((profile - outer[:, None]) * contrast[:, None]).sum(2) / np.maximum(strength, 1)[:, None] ** 2
+        # The first crossing of one half, from inside to outside, within reach.
+        first, last = int(np.searchsorted(steps, -REACH)), int(np.searchsorted(steps, REACH))
+        inside = share[:, first:last] >= 0.5
+        crosses = inside & (share[:, first + 1 : last + 1] < 0.5)
+        near = np.abs(steps[first:last])[None]
+        cost = np.where(crosses, near, np.inf)
+        index = cost.argmin(1)
+        each = np.arange(len(points))
+        is_found = crosses[each, index]
+        a, b = share[each, first + index], share[each, first + index + 1]
+        part = np.where(is_found, (a - 0.5) / np.where(is_found, a - b, 1.0), 0.0)
+        start, stop = offsets[each, first + index], offsets[each, first + index + 1]
+        away = start + part * (stop - start)
+        away = np.where(np.abs(away) <= np.abs(away - wall), away, away - wall)
+        limit = 0.12 * np.maximum(np.linalg.norm(inner, axis=1), np.linalg.norm(outer, axis=1)) + 8
+        weight = np.where(is_found & (strength > limit), np.where(facing, 0.3, 1.0), 0.0)
+        return np.where(weight > 0, away, 0.0), weight
+
+    def _judged(self, value: Any, tops: Any, shape: _Shape, laid: _Laid) -> _Laid:
+        """Judge by the colors whether a form lies there."""
+        rotation = _turning(laid.pose[2])
+        inside = self._sampled(value, shape.inside @ rotation + laid.pose[:2])
+        normals = shape.beyond_normals @ rotation
+        points = shape.beyond @ rotation + laid.pose[:2]
+        facing = self._faces_eye(points, normals)
+        points = np.where(facing[:, None], self._sunk(points), points)
+        beyond = float((self._sampled(value, points) > 0).mean())
+        even = float((self._sampled(tops, shape.inside @ rotation + laid.pose[:2]) > 0.5).mean())
+        seen, foreign = float((inside > 0).mean()), float((inside < 0).mean())
+        is_there = seen >= LEAST_SEEN and foreign <= MOST_FOREIGN and beyond <= MOST_BEYOND
+        is_known = laid.spread <= PLACE_KNOWN and laid.turn_spread <= TURN_KNOWN
+        return laid._replace(score=even + laid.support - foreign - beyond if is_there and is_known else 0.0, seen=seen)
+
+    def _take(self, value: Any, shape: _Shape, pose: Floats) -> None:
+        """Take what a piece explains away from others of its color: its top and its walls."""
+        top = shape.outline * 1.03 @ _turning(pose[2]) + pose[:2]
+        outline = cv2.convexHull(self._flat.at(np.concatenate([top, self._sunk(top)])).astype(np.float32))
+        cv2.fillConvexPoly(value, np.rint(outline[:, 0, ::-1]).astype(np.int32), -1.0)
+
+
+def learned(image: Image, table: TaskTable, flat: FlatTable) -> Palette:
+    """Learn the colors of pieces, and of the table, from a picture in which each lies where the task begins."""
+    laid = flat.laid_out(image)
+    samples: dict[str, list[Any]] = {}
+    free = np.ones(laid.shape[:2], np.uint8)
+    for form in table.pieces:
+        place = np.array([form.start.x, form.start.y])
+        shape = np.array(form.footprint) @ _turning(math.radians(form.start.yaw))
+        mask = np.zeros(laid.shape[:2], np.uint8)
+        inner, outer = flat.at(shape * 0.6 + place), flat.at(shape * 1.6 + place)
+        cv2.fillConvexPoly(mask, np.rint(inner[:, ::-1]).astype(np.int32), 1)
+        cv2.fillConvexPoly(free, np.rint(outer[:, ::-1]).astype(np.int32), 0)
+        samples.setdefault(form.color, []).append(laid[mask > 0])
+    free[laid.max(2) == 0] = 0
+    colors = {name: np.median(np.concatenate(each), 0) for name, each in samples.items()}
+    colors[TABLE] = np.median(laid[free > 0], 0)
+    return {name: (float(r), float(g), float(b)) for name, (r, g, b) in colors.items()}
