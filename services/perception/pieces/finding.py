@@ -56,14 +56,14 @@ CLEAR: Meters = 0.0015
 """Distance from an edge within which colors of both sides mix."""
 TOLERANCE: Meters = 0.001
 """Residual from which on a point of an edge counts less: half as much here."""
-CORRELATED = 3.0
+CORRELATED = 8.0
 """How many points of an edge err alike: what blurs a picture, and grains of a table, are larger than `SPACING`."""
 ROUNDS = 7
 UNEVEN = 0.15
 """Share by which the brightness of a piece's wall differs from that of its top."""
 LEAST_SEEN, MOST_FOREIGN, MOST_BEYOND = 0.35, 0.2, 0.45
 """Share of a form that must have its color, that may have another, and of its surroundings that may have its color."""
-PLACE_KNOWN: Meters = 0.002
+PLACE_KNOWN: Meters = 0.003
 TURN_KNOWN: Radians = math.radians(3.0)
 """Standard deviations of place and turn from which on it is not known where a piece lies."""
 
@@ -89,6 +89,14 @@ class _Laid(NamedTuple):
     support: float = 0.0
     spread: float = math.inf
     turn_spread: float = math.inf
+
+
+class _Seen(NamedTuple):
+    """A picture, laid out flat. value: 1 where a color is, -1 where another one is. tops: the same, less on walls."""
+
+    flat: Any
+    value: Any
+    tops: Any
 
 
 class FlatTable:
@@ -232,8 +240,8 @@ class PieceFinder:
         found = []
         candidates: list[tuple[_Shape, _Laid]] = []
         for shape in shapes:
-            likely = self._likely(tops, shape)
-            candidates += [(shape, self._moved(flat, value, tops, shape, each)) for each in likely]
+            seen = _Seen(flat, value, tops)
+            candidates += [(shape, self._moved(seen, shape, each)) for each in self._likely(tops, shape)]
         while candidates:
             shape, best = max(candidates, key=lambda each: each[1].score)
             if best.score <= 0.3:
@@ -243,7 +251,7 @@ class PieceFinder:
             self._take(value, shape, best.pose)
             tops = np.minimum(tops, value)
             candidates = [
-                (other, self._judged(value, tops, other, laid)) for other, laid in candidates if other is not shape
+                (other, self._judged(_Seen(flat, value, tops), other, laid)) for other, laid in candidates if other is not shape
             ]
         return found
 
@@ -264,14 +272,14 @@ class PieceFinder:
             tops[box][own & (np.abs(tone[box] - usual) > UNEVEN * usual + 3 * NOISE)] = 0.2
         return tops
 
-    def _likely(self, value: Any, shape: _Shape, most: int = 2) -> list[Floats]:
+    def _likely(self, value: Any, shape: _Shape, most: int = 4) -> list[Floats]:
         """Poses on a coarse lattice in which a form explains its color best."""
         mask = (value > 0.5).astype(np.uint8)
         mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
         count, _, boxes, _ = cv2.connectedComponentsWithStats(mask)
         turns = np.arange(0, math.tau / shape.orders - 1e-6, TURN)
         padded = np.pad(value, PAD)
-        poses: list[tuple[float, Floats]] = []
+        poses: list[tuple[float, tuple[int, int, float]]] = []
         for box in boxes[1:count]:
             left, top, wide, tall, area = (int(each) for each in box)
             if area * STEP**2 < 1e-4:  # a square centimetre
@@ -279,30 +287,47 @@ class PieceFinder:
             pixels = np.stack(
                 np.meshgrid(np.arange(top, top + tall + 1, SKIP), np.arange(left, left + wide + 1, SKIP)), -1
             ).reshape(-1, 2)
-            middle = self._flat.low + (np.array([top, left]) + np.array([tall, wide]) / 2) * STEP
             for turn in turns:
-                rotation = _turning(turn)
-                facing = self._faces_eye(middle, shape.beyond_normals @ rotation)
-                inside = self._around(padded, pixels, shape.inside @ rotation).mean(1)
-                beyond = shape.beyond @ rotation + middle
-                beyond = np.where(facing[:, None], self._sunk(beyond), beyond) - middle
-                beyond = np.maximum(self._around(padded, pixels, beyond), 0).mean(1)
-                score = inside - beyond
-                best = int(score.argmax())
-                place = self._flat.low + (pixels[best] + 0.5) * STEP
-                poses.append((float(score[best]), np.array([*place, turn])))
+                scores = self._explained(padded, shape, pixels, turn)
+                best = int(scores.argmax())
+                poses.append((float(scores[best]), (*pixels[best].tolist(), turn)))
         poses.sort(key=lambda each: -each[0])
         chosen: list[Floats] = []
-        for score, pose in poses:
-            if score < 0.1 or len(chosen) >= most * 2:
+        for score, (row, column, turn) in poses:
+            if score < 0.1 or len(chosen) >= most:
                 break
+            place = self._flat.low + (np.array([row, column]) + 0.5) * STEP
             if all(
-                math.dist(pose[:2], other[:2]) > 0.015
-                or abs(math.remainder(pose[2] - other[2], math.tau / shape.orders)) > 1.5 * TURN
+                math.dist(place, other[:2]) > 0.015
+                or abs(math.remainder(turn - other[2], math.tau / shape.orders)) > TURN
                 for other in chosen
             ):
-                chosen.append(pose)
+                chosen.append(self._nearer(padded, shape, row, column, turn))
         return chosen
+
+    def _nearer(self, padded: Any, shape: _Shape, row: int, column: int, turn: Radians) -> Floats:
+        """Look between the places of the lattice, twice as near each time."""
+        place, score = np.array([row, column]), -math.inf
+        for skip in (SKIP // 2, SKIP // 4):
+            near = np.stack(np.meshgrid(*[np.arange(-2, 3) * skip] * 2), -1).reshape(-1, 2)
+            turns = turn + np.arange(-2, 3) * TURN * skip / SKIP / 2
+            middle = place
+            for each in turns:
+                scores = self._explained(padded, shape, middle + near, each)
+                best = int(scores.argmax())
+                if scores[best] > score:
+                    score, place, turn = float(scores[best]), middle + near[best], float(each)
+        return np.array([*(self._flat.low + (place + 0.5) * STEP), turn])
+
+    def _explained(self, padded: Any, shape: _Shape, pixels: Any, turn: Radians) -> Any:
+        """How well a form at pixels, with one turn, explains its color: it is inside, and not beyond its walls."""
+        rotation = _turning(turn)
+        middle = self._flat.low + pixels[len(pixels) // 2] * STEP
+        facing = self._faces_eye(middle, shape.beyond_normals @ rotation)
+        beyond = shape.beyond @ rotation + middle
+        beyond = np.where(facing[:, None], self._sunk(beyond), beyond) - middle
+        inside = self._around(padded, pixels, shape.inside @ rotation).mean(1)
+        return inside - np.maximum(self._around(padded, pixels, beyond), 0).mean(1)
 
     def _around(self, padded: Any, pixels: Any, offsets: Floats) -> Any:
         """Values at offsets around each of some pixels."""
@@ -325,14 +350,14 @@ class PieceFinder:
 
     # -- where exactly ----------------------------------------------------------------------------------------------
 
-    def _moved(self, flat: Any, value: Any, tops: Any, shape: _Shape, pose: Floats) -> _Laid:
-        """Move a form onto the edges of the picture."""
+    def _moved(self, seen: _Seen, shape: _Shape, pose: Floats) -> _Laid:
+        """Move a form onto the edges near it."""
         information, residual = np.zeros((3, 3)), TOLERANCE
         for round_ in range(ROUNDS):
             rotation = _turning(pose[2])
             points, normals = shape.points @ rotation + pose[:2], shape.normals @ rotation
-            away, weight = self._edges(flat, points, normals)
-            weight = weight / (1 + (away / (TOLERANCE * (2 if round_ < 3 else 1))) ** 2) ** 2
+            away, weight = self._edges(seen.flat, points, normals)
+            weight = weight / (1 + (away / (TOLERANCE * (2 if round_ < ROUNDS / 2 else 1))) ** 2) ** 2
             arm = points - pose[:2]
             rows = np.column_stack([normals, normals[:, 1] * arm[:, 0] - normals[:, 0] * arm[:, 1]])
             information = (rows * weight[:, None]).T @ rows
@@ -342,7 +367,7 @@ class PieceFinder:
         covariance = np.linalg.inv(information / CORRELATED + np.diag([1e-6, 1e-6, 1e-10])) * residual**2
         support = float(((weight > 0.1) & (np.abs(away) < 2 * TOLERANCE)).mean())
         laid = _Laid(pose, 0.0, 0.0, support, math.sqrt(covariance[0, 0] + covariance[1, 1]), math.sqrt(covariance[2, 2]))
-        return self._judged(value, tops, shape, laid)
+        return self._judged(seen, shape, laid)
 
     def _edges(self, flat: Any, points: Floats, normals: Floats) -> tuple[Floats, Floats]:
         """Look for the edge at each point along its normal. Returns how far outside it is, and its weight."""
@@ -384,20 +409,19 @@ class PieceFinder:
         weight = np.where(is_found & (strength > limit), np.where(facing, 0.3, 1.0), 0.0)
         return np.where(weight > 0, away, 0.0), weight
 
-    def _judged(self, value: Any, tops: Any, shape: _Shape, laid: _Laid) -> _Laid:
+    def _judged(self, seen: _Seen, shape: _Shape, laid: _Laid) -> _Laid:
         """Judge by the colors whether a form lies there."""
         rotation = _turning(laid.pose[2])
-        inside = self._sampled(value, shape.inside @ rotation + laid.pose[:2])
-        normals = shape.beyond_normals @ rotation
-        points = shape.beyond @ rotation + laid.pose[:2]
-        facing = self._faces_eye(points, normals)
-        points = np.where(facing[:, None], self._sunk(points), points)
-        beyond = float((self._sampled(value, points) > 0).mean())
-        even = float((self._sampled(tops, shape.inside @ rotation + laid.pose[:2]) > 0.5).mean())
-        seen, foreign = float((inside > 0).mean()), float((inside < 0).mean())
-        is_there = seen >= LEAST_SEEN and foreign <= MOST_FOREIGN and beyond <= MOST_BEYOND
+        places = shape.inside @ rotation + laid.pose[:2]
+        inside, top = self._sampled(seen.value, places), self._sampled(seen.tops, places)
+        points, normals = shape.beyond @ rotation + laid.pose[:2], shape.beyond_normals @ rotation
+        points = np.where(self._faces_eye(points, normals)[:, None], self._sunk(points), points)
+        beyond = float((self._sampled(seen.value, points) > 0).mean())
+        own, foreign = float((inside > 0).mean()), float((inside < 0).mean())
+        is_there = own >= LEAST_SEEN and foreign <= MOST_FOREIGN and beyond <= MOST_BEYOND
         is_known = laid.spread <= PLACE_KNOWN and laid.turn_spread <= TURN_KNOWN
-        return laid._replace(score=even + laid.support - foreign - beyond if is_there and is_known else 0.0, seen=seen)
+        score = float((top > 0.5).mean()) + laid.support - foreign - beyond
+        return laid._replace(score=score if is_there and is_known else 0.0, seen=own)
 
     def _take(self, value: Any, shape: _Shape, pose: Floats) -> None:
         """Take what a piece explains away from others of its color: its top and its walls."""
