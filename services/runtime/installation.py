@@ -78,8 +78,9 @@ def _from_here(path: Path) -> str:
 if TYPE_CHECKING:
     from importlib.metadata import Distribution, EntryPoint
 
-GROUPS = BODIES, VOICES, SERVICES, RECOGNIZERS, LANDMARKS = (
-    "engage.bodies", "engage.voices", "engage.services", "engage.recognizers", "engage.landmarks",
+GROUPS = BODIES, VOICES, SERVICES, RECOGNIZERS, LANDMARKS, PIECES, TABLES = (
+    "engage.bodies", "engage.voices", "engage.services", "engage.recognizers", "engage.landmarks", "engage.pieces",
+    "engage.tables",
 )  # fmt: skip
 
 

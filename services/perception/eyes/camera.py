@@ -44,6 +44,6 @@ class StatedCamera:
         return (x, y, z)
 
     def pixels(self, points: Floats, width: int, height: int) -> Floats:
-        """Where places in the robot's frame, rows of x, y and z, are in pictures of a size: pixels from its corner."""
+        """Pixels at which places are, from the corner of pictures of a size. points: rows of x, y, z."""
         x, y, z = ((np.asarray(points) - self._place) @ self._axes).T
         return np.column_stack([width / 2 + self.focal(width) * x / z, height / 2 + self.focal(width) * y / z])

@@ -80,7 +80,7 @@ class Seeing:
     """The people before one camera."""
 
     def __init__(self, config: EyesConfig) -> None:
-        self._camera = StatedCamera(config.field_of_view, config.place, config.tilt, config.pan)
+        self._camera = StatedCamera(config.field_of_view, config.place, config.tilt, config.pan, config.roll)
         self._tracker = FaceTracker()
         self._known: dict[str, _Known] = {}
         self._at = float("-inf")

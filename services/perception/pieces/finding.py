@@ -1,7 +1,7 @@
 """Pieces in one picture of a table: which pixels have which color, and where the forms lie that have it.
 
-The picture is laid out flat, as if seen from straight above at the height of the tops of the pieces. Light is not what
-it was when the colors were learned: it is brighter or darker, of another tint, uneven, and pieces and hands throw
+The picture is laid out flat, as if seen from straight above at the height of the tops of the pieces. Light is not
+what it was when the colors were learned: it is brighter or darker, of another tint, uneven, and pieces and hands throw
 shadows. So each pixel is compared with the colors as they would look under the light that the table has around it, in
 shadows of several depths, and as a camera clips what is too bright. What is like none of them (a sleeve, a hand) says
 nothing: it covers.
@@ -22,15 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engage_hri.schemas.tables import Form, TaskTable
-from engage_hri.schemas.units import Meters, Probability, Radians
+from engage_hri.schemas.units import Meters, Radians
 from engage_hri.services.perception.eyes.camera import StatedCamera
 from engage_hri.services.perception.eyes.looking import Floats
+from engage_hri.services.perception.pictures import Image
+from engage_hri.services.perception.pieces.colors import TABLE, Palette
+from engage_hri.services.perception.pieces.spotting import SpottedPiece
 
-Image = NDArray[np.uint8]
 Labels = NDArray[np.int8]
-Palette = dict[str, tuple[float, float, float]]
-"""Red, green and blue of each color, and of the table, under the same light."""
-TABLE = "table"
 STEP: Meters = 0.0015
 """Size of a pixel of the table that is laid out flat."""
 MARGIN: Meters = 0.02
@@ -62,22 +61,14 @@ ROUNDS = 7
 UNEVEN = 0.15
 """Share by which the brightness of a piece's wall differs from that of its top."""
 LEAST_SEEN, MOST_FOREIGN, MOST_BEYOND = 0.35, 0.2, 0.45
-"""Share of a form that must have its color, that may have another, and of its surroundings that may have its color."""
+"""Share of a form that must have its color, and may have another; of its surroundings that may have its color."""
+BARE = 0.9
+"""Share of the place of a piece that has the color of the table if the piece is away."""
+AGAIN, SAME = 10, 1.3
+"""Pictures after which a piece is looked for everywhere, and score of one that is where it was, which saves that."""
 PLACE_KNOWN: Meters = 0.003
 TURN_KNOWN: Radians = math.radians(3.0)
 """Standard deviations of place and turn from which on it is not known where a piece lies."""
-
-
-class FoundPiece(NamedTuple):
-    """A piece in a picture. seen: share of it that is in view. spread, turn_spread: standard deviations."""
-
-    id: str
-    x: Meters
-    y: Meters
-    yaw: Radians
-    seen: Probability
-    spread: Meters
-    turn_spread: Radians
 
 
 class _Laid(NamedTuple):
@@ -102,10 +93,11 @@ class _Seen(NamedTuple):
 class FlatTable:
     """A table before a camera: pictures of it are laid out flat, pixels of `STEP`, rows along x, columns along y."""
 
-    def __init__(self, table: TaskTable, camera: StatedCamera, eye: Sequence[float], width: int, height: int) -> None:
-        """eye: place of the camera. width, height: of its pictures."""
+    def __init__(self, table: TaskTable, camera: StatedCamera, width: int, height: int) -> None:
+        """Look at it with a camera. width, height: of its pictures, pixels."""
+        eye = camera.place(np.zeros(3))
         x, y, z = table.surface.center
-        corners = np.array(table.surface.footprint) + [x, y]
+        corners = np.array(table.surface.footprint) + np.array([x, y])
         self.low = corners.min(0) - MARGIN
         self.rows, self.columns = (int(n) for n in np.ceil((corners.max(0) + MARGIN - self.low) / STEP))
         top = z + table.thickness
@@ -130,7 +122,7 @@ class FlatTable:
 
     def at(self, points: Floats) -> Floats:
         """Rows and columns of places on the table, with their fractions."""
-        return (points - self.low) / STEP
+        return np.asarray((points - self.low) / STEP)
 
 
 def light(flat: NDArray[np.float32], table: Sequence[float]) -> NDArray[np.float32]:
@@ -201,13 +193,6 @@ class _Shape:
         depth = ((lattice[:, None] - self.outline) * normals).sum(2).max(1)
         self.inside = lattice[depth < -0.0025]
         self.beyond, self.beyond_normals = self.points + 0.004 * self.normals, self.normals
-        self.orders = next(n for n in (4, 3, 2, 1) if _is_symmetric(self.outline, n))
-        """How many turns of a circle look the same."""
-
-
-def _is_symmetric(outline: Floats, order: int) -> bool:
-    turned = outline @ _turning(math.tau / order)
-    return all(np.linalg.norm(self_ - turned, axis=1).min() < 0.002 for self_ in outline)
 
 
 def _turning(angle: float) -> Floats:
@@ -222,36 +207,57 @@ class PieceFinder:
         self._flat, self._palette = flat, palette
         self._names = [*palette]
         self._shapes = [_Shape(form) for form in table.pieces]
+        self._last: dict[str, Floats] = {}
+        """Pose in which each was seen last."""
+        self._count = 0
 
-    def find(self, image: Image) -> list[FoundPiece]:
-        """Find the pieces in a picture."""
+    def find(self, image: Image) -> tuple[list[SpottedPiece], list[str]]:
+        """Find the pieces in the next picture. Returns also the ids of those where the bare table is seen now."""
         flat = self._flat.laid_out(image)
         labels = labeled(flat, self._palette)
         found = []
         for color in {shape.form.color: None for shape in self._shapes}:
             shapes = [shape for shape in self._shapes if shape.form.color == color]
             found += self._of_color(flat, labels, self._names.index(color), shapes)
-        return found
+        ids = {piece.id for piece in found}
+        bare = [shape.form.id for shape in self._shapes if shape.form.id not in ids and self._is_bare(labels, shape)]
+        self._last |= {piece.id: np.array([piece.x, piece.y, piece.yaw]) for piece in found}
+        self._count += 1
+        return found, bare
 
-    def _of_color(self, flat: Any, labels: Labels, number: int, shapes: Iterable[_Shape]) -> list[FoundPiece]:
+    def _is_bare(self, labels: Labels, shape: _Shape) -> bool:
+        """Tell whether the table is seen where a form lay last."""
+        if (pose := self._last.get(shape.form.id)) is None:
+            return False
+        there = self._sampled(labels, shape.inside @ _turning(pose[2]) + pose[:2], UNKNOWN)
+        return bool((there == self._names.index(TABLE)).mean() > BARE)
+
+    def _of_color(self, flat: Any, labels: Labels, number: int, shapes: Iterable[_Shape]) -> list[SpottedPiece]:
         """Find the pieces of one color: the one that explains most first; what it explains is no other's."""
         value = np.where(labels == number, 1.0, np.where(labels == UNKNOWN, 0.0, -1.0)).astype(np.float32)
         tops = self._tops(flat, value)
         found = []
         candidates: list[tuple[_Shape, _Laid]] = []
+        seen = _Seen(flat, value, tops)
+        looks_everywhere = (self._count + number) % AGAIN == 0
         for shape in shapes:
-            seen = _Seen(flat, value, tops)
-            candidates += [(shape, self._moved(seen, shape, each)) for each in self._likely(tops, shape)]
+            last = self._last.get(shape.form.id)
+            known = [self._moved(seen, shape, last)] if last is not None else []
+            candidates += [(shape, each) for each in known]
+            if looks_everywhere or not known or known[0].score < SAME:
+                candidates += [(shape, self._moved(seen, shape, each)) for each in self._likely(tops, shape)]
         while candidates:
             shape, best = max(candidates, key=lambda each: each[1].score)
             if best.score <= 0.3:
                 break
             x, y, yaw = best.pose.tolist()
-            found.append(FoundPiece(shape.form.id, x, y, yaw, best.seen, best.spread, best.turn_spread))
+            found.append(SpottedPiece(shape.form.id, x, y, yaw, best.seen, best.spread, best.turn_spread))
             self._take(value, shape, best.pose)
             tops = np.minimum(tops, value)
             candidates = [
-                (other, self._judged(_Seen(flat, value, tops), other, laid)) for other, laid in candidates if other is not shape
+                (other, self._judged(_Seen(flat, value, tops), other, laid))
+                for other, laid in candidates
+                if other is not shape
             ]
         return found
 
@@ -277,7 +283,7 @@ class PieceFinder:
         mask = (value > 0.5).astype(np.uint8)
         mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
         count, _, boxes, _ = cv2.connectedComponentsWithStats(mask)
-        turns = np.arange(0, math.tau / shape.orders - 1e-6, TURN)
+        turns = np.arange(0, math.tau / shape.form.turns_alike - 1e-6, TURN)
         padded = np.pad(value, PAD)
         poses: list[tuple[float, tuple[int, int, float]]] = []
         for box in boxes[1:count]:
@@ -299,7 +305,7 @@ class PieceFinder:
             place = self._flat.low + (np.array([row, column]) + 0.5) * STEP
             if all(
                 math.dist(place, other[:2]) > 0.015
-                or abs(math.remainder(turn - other[2], math.tau / shape.orders)) > TURN
+                or abs(math.remainder(turn - other[2], math.tau / shape.form.turns_alike)) > TURN
                 for other in chosen
             ):
                 chosen.append(self._nearer(padded, shape, row, column, turn))
@@ -320,7 +326,7 @@ class PieceFinder:
         return np.array([*(self._flat.low + (place + 0.5) * STEP), turn])
 
     def _explained(self, padded: Any, shape: _Shape, pixels: Any, turn: Radians) -> Any:
-        """How well a form at pixels, with one turn, explains its color: it is inside, and not beyond its walls."""
+        """Judge forms at pixels, with one turn, by their color: it is inside, and not beyond their walls."""
         rotation = _turning(turn)
         middle = self._flat.low + pixels[len(pixels) // 2] * STEP
         facing = self._faces_eye(middle, shape.beyond_normals @ rotation)
@@ -340,13 +346,13 @@ class PieceFinder:
         return ((self._flat.eye - points) * normals).sum(-1) > 0
 
     def _sunk(self, points: Floats) -> Floats:
-        """Where the foot of a wall is seen whose upper edge has these points."""
-        return self._flat.eye + self._flat.sunk * (points - self._flat.eye)
+        """Places at which the foot of a wall is seen whose upper edge has these points."""
+        return np.asarray(self._flat.eye + self._flat.sunk * (points - self._flat.eye))
 
-    def _sampled(self, value: Any, points: Floats) -> Any:
+    def _sampled(self, value: Any, points: Floats, beside: float = 0.0) -> Any:
         rows, columns = np.moveaxis(np.rint(self._flat.at(points) - 0.5).astype(np.int32), -1, 0)
         inside = (rows >= 0) & (columns >= 0) & (rows < self._flat.rows) & (columns < self._flat.columns)
-        return np.where(inside, value[rows * inside, columns * inside], 0.0)
+        return np.where(inside, value[rows * inside, columns * inside], beside)
 
     # -- where exactly ----------------------------------------------------------------------------------------------
 
@@ -366,7 +372,9 @@ class PieceFinder:
             residual = max(0.0004, math.sqrt(float((weight * away**2).sum() / max(weight.sum(), 1e-9))))
         covariance = np.linalg.inv(information / CORRELATED + np.diag([1e-6, 1e-6, 1e-10])) * residual**2
         support = float(((weight > 0.1) & (np.abs(away) < 2 * TOLERANCE)).mean())
-        laid = _Laid(pose, 0.0, 0.0, support, math.sqrt(covariance[0, 0] + covariance[1, 1]), math.sqrt(covariance[2, 2]))
+        laid = _Laid(
+            pose, 0.0, 0.0, support, math.sqrt(covariance[0, 0] + covariance[1, 1]), math.sqrt(covariance[2, 2])
+        )
         return self._judged(seen, shape, laid)
 
     def _edges(self, flat: Any, points: Floats, normals: Floats) -> tuple[Floats, Floats]:

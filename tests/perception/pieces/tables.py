@@ -27,7 +27,10 @@ PAINT = {
 WOOD, FLOOR = (165, 130, 95), (90, 90, 92)
 SKINS = ((205, 155, 130), (225, 180, 160), (150, 105, 80), (85, 58, 45))
 FINE = 2
-STARTS: dict[str, Pose] = {each.id: (each.start.x, each.start.y, math.radians(each.start.yaw)) for each in TABLE.pieces}
+"""How many times as fine a picture is drawn as it is wanted."""
+STARTS: dict[str, Pose] = {
+    each.id: (each.start.x, each.start.y, math.radians(each.start.yaw)) for each in TABLE.pieces
+}
 GOALS: dict[str, Pose] = {each.id: (each.goal.x, each.goal.y, math.radians(each.goal.yaw)) for each in TABLE.pieces}
 FOOTPRINTS = {each.id: np.array(each.footprint) for each in TABLE.pieces}
 COLORS = {each.id: each.color for each in TABLE.pieces}
@@ -64,6 +67,10 @@ class Light(NamedTuple):
     blur: float = 0.8
 
 
+EYE, EVEN = Eye(), Light()
+"""The eyes of the robot, and the light in which colors are learned."""
+
+
 class Hand(NamedTuple):
     """A hand over the table, which comes from the person's side. at: of the middle of its palm."""
 
@@ -80,7 +87,7 @@ def corners(id: str, pose: Pose) -> Floats:
 
 
 def drawn(
-    poses: Mapping[str, Pose], eye: Eye = Eye(), light: Light = Light(), hand: Hand | None = None, seed: int = 0
+    poses: Mapping[str, Pose], eye: Eye = EYE, light: Light = EVEN, hand: Hand | None = None, seed: int = 0
 ) -> Picture:
     """A picture, red, green and blue."""
     rng = np.random.default_rng(seed)
@@ -150,14 +157,16 @@ def _outlines(hand: Hand) -> list[Floats]:
     palm = np.column_stack([0.045 * np.cos(round_), 0.040 * np.sin(round_)])
     parts = [palm, np.array([[0.02, -0.03], [0.5, -0.04], [0.5, 0.04], [0.02, 0.03]])]
     for y, length in ((-0.030, 0.060), (-0.010, 0.072), (0.010, 0.070), (0.029, 0.055)):
-        parts.append(np.array([[-0.03 - length, y - 0.008], [0, y - 0.009], [0, y + 0.009], [-0.03 - length, y + 0.008]]))
+        parts.append(
+            np.array([[-0.03 - length, y - 0.008], [0, y - 0.009], [0, y + 0.009], [-0.03 - length, y + 0.008]])
+        )
     parts.append(np.array([[-0.05, 0.055], [0.01, 0.03], [0.02, 0.045], [-0.045, 0.070]]))
     c, s = math.cos(hand.turn), math.sin(hand.turn)
     return [part @ np.array([[c, s], [-s, c]]) + hand.at for part in parts]
 
 
 def layout(rng: np.random.Generator) -> dict[str, Pose]:
-    """A table on the way to the figure: pieces laid by hand where they belong, one perhaps elsewhere, others strewn."""
+    """A table on the way to the figure: pieces laid by hand where they belong, one perhaps wrongly, others strewn."""
     ids = [*GOALS]
     built = {TABLE.base, *rng.permutation(ids)[: int(rng.integers(0, len(ids) + 1))].tolist()}
     poses: dict[str, Pose] = {}
@@ -165,12 +174,19 @@ def layout(rng: np.random.Generator) -> dict[str, Pose]:
         if id in built:
             x, y, turn = GOALS[id]
             poses[id] = (x + rng.normal(0, 0.0015), y + rng.normal(0, 0.0015), turn + math.radians(rng.normal(0, 2)))
-    for id in ids:
-        if id in built:
+    waiting = [id for id in ids if id not in built]
+    if waiting and rng.random() < 0.5:
+        poses |= _laid_wrongly(waiting[0], poses, rng)
+    for id in waiting:
+        if id in poses:
             continue
         for _ in range(500):
-            pose = (float(rng.uniform(0.36, 0.80)), float(rng.uniform(-0.40, 0.40)), float(rng.uniform(-np.pi, np.pi)))
-            shown = Eye()(np.column_stack([corners(id, pose), np.full(len(FOOTPRINTS[id]), TOP)]))
+            pose = (
+                float(rng.uniform(0.36, 0.80)),
+                float(rng.uniform(-0.40, 0.40)),
+                float(rng.uniform(-np.pi, np.pi)),
+            )
+            shown = EYE(np.column_stack([corners(id, pose), np.full(len(FOOTPRINTS[id]), TOP)]))
             if (shown.min(0) < 10).any() or (shown.max(0) > [1270, 710]).any():
                 continue  # beyond the edge of the picture
             if all(_apart(id, pose, other, where) > 0.012 for other, where in poses.items()):
@@ -179,10 +195,29 @@ def layout(rng: np.random.Generator) -> dict[str, Pose]:
     return poses
 
 
+def _laid_wrongly(id: str, poses: Mapping[str, Pose], rng: np.random.Generator) -> dict[str, Pose]:
+    """A piece whose edge is laid on an edge of another piece, of the same length, where nothing lies."""
+    found = []
+    for other, where in poses.items():
+        theirs = corners(other, where)
+        for a, b in zip(theirs, np.roll(theirs, -1, 0), strict=True):
+            for p, q in zip(FOOTPRINTS[id], np.roll(FOOTPRINTS[id], -1, 0), strict=True):
+                if abs(math.dist(a, b) - math.dist(p, q)) < 0.001:
+                    turn = math.atan2(*(a - b)[::-1]) - math.atan2(*(q - p)[::-1]) + math.radians(rng.normal(0, 2))
+                    c, s = math.cos(turn), math.sin(turn)
+                    middle = (p + q) / 2 @ np.array([[c, s], [-s, c]])
+                    x, y = (a + b) / 2 - middle + rng.normal(0, 0.0015, 2)
+                    if all(_apart(id, (x, y, turn), each, at) > 0 or each == other for each, at in poses.items()):
+                        found.append((float(x), float(y), turn))
+    return {id: found[int(rng.integers(len(found)))]} if found else {}
+
+
 def _apart(id: str, pose: Pose, other: str, where: Pose) -> float:
     """Distance of two pieces, at their outlines."""
     a, b = corners(id, pose), corners(other, where)
     if cv2.intersectConvexConvex(a.astype(np.float32), b.astype(np.float32))[0] > 0:
         return 0.0
-    dense = [np.concatenate([np.linspace(p, q, 12) for p, q in zip(c, np.roll(c, -1, 0), strict=True)]) for c in (a, b)]
+    dense = [
+        np.concatenate([np.linspace(p, q, 12) for p, q in zip(c, np.roll(c, -1, 0), strict=True)]) for c in (a, b)
+    ]
     return float(np.linalg.norm(dense[0][:, None] - dense[1], axis=2).min())
