@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from engage_hri.schemas.units import Stamp
+from engage_hri.schemas.world import Entity
 from engage_hri.services.perception.eyes.camera import StatedCamera
 from engage_hri.services.perception.pieces.finding import FlatTable, PieceFinder, learned
 from engage_hri.services.perception.pieces.keeping import PieceKeeper
@@ -61,10 +62,10 @@ def judged(number: int) -> Judged:
         int(rng.integers(4)),
     )
     hands = [None, None, hand, hand, hand] if condition.startswith("a hand") else [None, None]
-    finder, keeper, told, spent = PieceFinder(TABLE, flat, palette), PieceKeeper(TABLE), (), []
+    finder, keeper, spent = PieceFinder(TABLE, flat, palette), PieceKeeper(TABLE), list[float]()
+    told: tuple[Entity, ...] = ()
     for k, each in enumerate(hands):
-        # The seed is that of the sun and the grain: noise alone differs.
-        picture = drawn(truth, EYE, light, each, seed=number)
+        picture = drawn(truth, EYE, light, each, seed=number, take=k)
         begin = time.process_time()
         pieces, bare = finder.find(picture)
         spent.append(1000 * (time.process_time() - begin))
@@ -76,11 +77,8 @@ def judged(number: int) -> Judged:
     away = [1000 * math.dist(pose[:2], truth[id][:2]) for id, pose in poses.items()]
     turned = [math.degrees(abs(math.remainder(p[2] - truth[id][2], math.tau / alike[id]))) for id, p in poses.items()]
     wrong = [f"{number}: {' '.join(each)}" for each in sorted(found - expected)]
-    wrong += [
-        f"{number}: {id} {a:.1f} mm, {t:.0f} degrees"
-        for id, a, t in zip(poses, away, turned, strict=True)
-        if a > 5 or t > 8
-    ]
+    beside = zip(poses, away, turned, strict=True)
+    wrong += [f"{number}: {id} {a:.1f} mm, {t:.0f} degrees" for id, a, t in beside if a > 5 or t > 8]
     return Judged(
         condition, len(expected & found), len(expected - found), len(found - expected), len(truth), away, turned,
         spent[0], spent[1], wrong,

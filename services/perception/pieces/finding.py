@@ -1,10 +1,10 @@
 """Pieces in one picture of a table: which pixels have which color, and where the forms lie that have it.
 
 The picture is laid out flat, as if seen from straight above at the height of the tops of the pieces. Light is not
-what it was when the colors were learned: it is brighter or darker, of another tint, uneven, and pieces and hands throw
-shadows. So each pixel is compared with the colors as they would look under the light that the table has around it, in
-shadows of several depths, and as a camera clips what is too bright. What is like none of them (a sleeve, a hand) says
-nothing: it covers.
+what it was when the colors were learned: it is brighter or darker, of another tint, uneven, and pieces and hands
+throw shadows. So each pixel is compared with the colors as they would look under the light that the table has around
+it, in shadows of several depths, and as a camera clips what is too bright. What is like none of them (a sleeve, a
+hand) says nothing: it covers.
 
 A form is laid wherever much of its color is (all turns, on a coarse lattice), and then moved until its edges lie on
 the edges in the picture. There each edge has the colors on both of its sides to compare, whatever the light. A piece
@@ -33,6 +33,8 @@ Labels = NDArray[np.int8]
 STEP: Meters = 0.0015
 """Size of a pixel of the table that is laid out flat."""
 MARGIN: Meters = 0.02
+WIDE: Meters = 0.08
+"""Width over which light is taken for even: wider than a hand."""
 UNKNOWN = -1
 SHADES = (1.15, 1.0, 0.86, 0.74, 0.63, 0.54, 0.46, 0.4, 0.34)
 """Light of a pixel, as shares of that around it."""
@@ -58,14 +60,19 @@ TOLERANCE: Meters = 0.001
 CORRELATED = 8.0
 """How many points of an edge err alike: what blurs a picture, and grains of a table, are larger than `SPACING`."""
 ROUNDS = 7
+SMALL: Meters = 0.0001
+"""Step after which the next would change nothing."""
 UNEVEN = 0.15
 """Share by which the brightness of a piece's wall differs from that of its top."""
 LEAST_SEEN, MOST_FOREIGN, MOST_BEYOND = 0.35, 0.2, 0.45
 """Share of a form that must have its color, and may have another; of its surroundings that may have its color."""
-BARE = 0.9
-"""Share of the place of a piece that has the color of the table if the piece is away."""
-AGAIN, SAME = 10, 1.3
-"""Pictures after which a piece is looked for everywhere, and score of one that is where it was, which saves that."""
+BARE = 0.06
+"""Share by which the place of a piece that is away may differ from the color of the table."""
+LEAST, SAME, CERTAIN = 0.3, 1.3, 1.75
+"""Score of what is a piece at all; of one that is where it was, so that it is not looked for; of one that is so well
+found that no other place is tried. At most it is 2."""
+AGAIN = 10
+"""Pictures after which a piece is looked for everywhere, whatever its score."""
 PLACE_KNOWN: Meters = 0.003
 TURN_KNOWN: Radians = math.radians(3.0)
 """Standard deviations of place and turn from which on it is not known where a piece lies."""
@@ -132,16 +139,15 @@ def light(flat: NDArray[np.float32], table: Sequence[float]) -> NDArray[np.float
     overall = np.median(ratio[seen], 0) if seen.any() else np.ones(3, np.float32)
     near = (np.abs(ratio / overall - 1).max(2) < 0.2) & seen
     weight = near.astype(np.float32)[..., None]
-    wide = 10 / STEP * 0.004  # a hand's breadth
-    total = cv2.GaussianBlur(np.concatenate([ratio * weight, weight], 2), (0, 0), wide / 4)
+    total = cv2.GaussianBlur(np.concatenate([ratio * weight, weight], 2), (0, 0), WIDE / STEP / 4)
     own = 0.02
     local = (total[..., :3] + own * overall) / (total[..., 3:] + own)
     return np.asarray(cv2.resize(local, flat.shape[1::-1], interpolation=cv2.INTER_LINEAR), np.float32)
 
 
-def labeled(flat: NDArray[np.float32], palette: Palette) -> Labels:
-    """Color of each pixel: its number in the palette, or `UNKNOWN`."""
-    names, around = [*palette], light(flat, palette[TABLE])
+def labeled(flat: NDArray[np.float32], around: NDArray[np.float32], palette: Palette) -> Labels:
+    """Color of each pixel: its number in the palette, or `UNKNOWN`. around: the light there."""
+    names = [*palette]
     soft = cv2.GaussianBlur(flat, (0, 0), 0.8)
     labels = np.full(flat.shape[:2], UNKNOWN, np.int8)
     ground = _distance(soft.reshape(-1, 3), around.reshape(-1, 3), palette[TABLE]).reshape(labels.shape)
@@ -214,54 +220,69 @@ class PieceFinder:
     def find(self, image: Image) -> tuple[list[SpottedPiece], list[str]]:
         """Find the pieces in the next picture. Returns also the ids of those where the bare table is seen now."""
         flat = self._flat.laid_out(image)
-        labels = labeled(flat, self._palette)
+        around = light(flat, self._palette[TABLE])
+        labels = labeled(flat, around, self._palette)
         found = []
         for color in {shape.form.color: None for shape in self._shapes}:
             shapes = [shape for shape in self._shapes if shape.form.color == color]
             found += self._of_color(flat, labels, self._names.index(color), shapes)
         ids = {piece.id for piece in found}
-        bare = [shape.form.id for shape in self._shapes if shape.form.id not in ids and self._is_bare(labels, shape)]
+        away = [shape for shape in self._shapes if shape.form.id not in ids]
+        bare = [shape.form.id for shape in away if self._is_bare(flat, around, shape)]
         self._last |= {piece.id: np.array([piece.x, piece.y, piece.yaw]) for piece in found}
         self._count += 1
         return found, bare
 
-    def _is_bare(self, labels: Labels, shape: _Shape) -> bool:
-        """Tell whether the table is seen where a form lay last."""
+    def _is_bare(self, flat: Any, around: Any, shape: _Shape) -> bool:
+        """Tell whether the table is seen where a form lay last. Skin may be like it in another light: in this very one
+        it has to be, on average.
+        """
         if (pose := self._last.get(shape.form.id)) is None:
             return False
-        there = self._sampled(labels, shape.inside @ _turning(pose[2]) + pose[:2], UNKNOWN)
-        return bool((there == self._names.index(TABLE)).mean() > BARE)
+        places = shape.inside @ _turning(pose[2]) + pose[:2]
+        seen, lights = (self._sampled(each, places).mean(0) for each in (flat, around))
+        expected = np.minimum(lights * np.array(self._palette[TABLE]), 255)
+        return bool((np.abs(seen - expected) < BARE * expected + NOISE / 2).all())
 
     def _of_color(self, flat: Any, labels: Labels, number: int, shapes: Iterable[_Shape]) -> list[SpottedPiece]:
         """Find the pieces of one color: the one that explains most first; what it explains is no other's."""
         value = np.where(labels == number, 1.0, np.where(labels == UNKNOWN, 0.0, -1.0)).astype(np.float32)
         tops = self._tops(flat, value)
-        found = []
-        candidates: list[tuple[_Shape, _Laid]] = []
-        seen = _Seen(flat, value, tops)
+        seen, found = _Seen(flat, value, tops), []
         looks_everywhere = (self._count + number) % AGAIN == 0
-        for shape in shapes:
-            last = self._last.get(shape.form.id)
-            known = [self._moved(seen, shape, last)] if last is not None else []
-            candidates += [(shape, each) for each in known]
-            if looks_everywhere or not known or known[0].score < SAME:
-                candidates += [(shape, self._moved(seen, shape, each)) for each in self._likely(tops, shape)]
-        while candidates:
-            shape, best = max(candidates, key=lambda each: each[1].score)
-            if best.score <= 0.3:
+        waiting = {shape.form.id: shape for shape in shapes}
+        best = {id: self._where_it_was(seen, shape) for id, shape in waiting.items()}
+        while waiting:
+            for id, shape in waiting.items():
+                if looks_everywhere or best[id].score < SAME:
+                    best[id] = max(best[id], self._anywhere(seen, shape), key=lambda laid: laid.score)
+            id = max(waiting, key=lambda each: best[each].score)
+            shape, laid = waiting.pop(id), best[id]
+            if laid.score <= LEAST:
                 break
-            x, y, yaw = best.pose.tolist()
-            found.append(SpottedPiece(shape.form.id, x, y, yaw, best.seen, best.spread, best.turn_spread))
-            self._take(value, shape, best.pose)
-            tops = np.minimum(tops, value)
-            candidates = [
-                (other, self._judged(_Seen(flat, value, tops), other, laid))
-                for other, laid in candidates
-                if other is not shape
-            ]
+            x, y, yaw = laid.pose.tolist()
+            found.append(SpottedPiece(id, x, y, yaw, laid.seen, laid.spread, laid.turn_spread))
+            self._take(value, shape, laid.pose)
+            seen = _Seen(flat, value, np.minimum(tops, value))
+            best = {each: self._judged(seen, shape, best[each]) for each, shape in waiting.items()}
+            looks_everywhere = False
         return found
 
     # -- where a form may lie ---------------------------------------------------------------------------------------
+
+    def _where_it_was(self, seen: _Seen, shape: _Shape) -> _Laid:
+        """Lay a form where it was seen last. Its score is 0 if that is nowhere."""
+        last = self._last.get(shape.form.id)
+        return _Laid(np.zeros(3), 0.0) if last is None else self._moved(seen, shape, last)
+
+    def _anywhere(self, seen: _Seen, shape: _Shape) -> _Laid:
+        """Lay a form where it explains its color best, of all places."""
+        best = _Laid(np.zeros(3), 0.0)
+        for pose in self._likely(seen.tops, shape):
+            best = max(best, self._moved(seen, shape, pose), key=lambda laid: laid.score)
+            if best.score > CERTAIN:
+                break
+        return best
 
     def _tops(self, flat: Any, value: Any) -> Any:
         """Values in which walls count less than tops: most of what is seen of a piece is its top, and walls are
@@ -349,10 +370,11 @@ class PieceFinder:
         """Places at which the foot of a wall is seen whose upper edge has these points."""
         return np.asarray(self._flat.eye + self._flat.sunk * (points - self._flat.eye))
 
-    def _sampled(self, value: Any, points: Floats, beside: float = 0.0) -> Any:
+    def _sampled(self, value: Any, points: Floats) -> Any:
         rows, columns = np.moveaxis(np.rint(self._flat.at(points) - 0.5).astype(np.int32), -1, 0)
         inside = (rows >= 0) & (columns >= 0) & (rows < self._flat.rows) & (columns < self._flat.columns)
-        return np.where(inside, value[rows * inside, columns * inside], beside)
+        found = value[rows * inside, columns * inside]
+        return np.where(inside if found.ndim == inside.ndim else inside[..., None], found, 0.0)
 
     # -- where exactly ----------------------------------------------------------------------------------------------
 
@@ -370,6 +392,8 @@ class PieceFinder:
             step = np.linalg.solve(information + np.diag([1e-3, 1e-3, 1e-7]), rows.T @ (weight * away))
             pose = pose + np.clip(step, [-0.006, -0.006, -0.15], [0.006, 0.006, 0.15])
             residual = max(0.0004, math.sqrt(float((weight * away**2).sum() / max(weight.sum(), 1e-9))))
+            if round_ >= ROUNDS / 2 and np.abs(step[:2]).max() < SMALL:
+                break
         covariance = np.linalg.inv(information / CORRELATED + np.diag([1e-6, 1e-6, 1e-10])) * residual**2
         support = float(((weight > 0.1) & (np.abs(away) < 2 * TOLERANCE)).mean())
         laid = _Laid(

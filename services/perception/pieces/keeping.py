@@ -28,6 +28,10 @@ from engage_hri.services.perception.pieces.spotting import SpottedPiece, Spotted
 AWAY: Meters = 0.004
 """Distance, and turn, from which on a piece is elsewhere."""
 TURNED: Radians = math.radians(4.0)
+WHOLE: Probability = 0.9
+NEAR: Meters = 0.02
+"""Share of a piece that is not seen to have moved, by less than this distance, unless so much of it is in view: what is
+covered in part is measured worse."""
 NUDGE: Meters = 0.001
 TWIST: Radians = math.radians(1.0)
 WINDOW: Seconds = 1.0
@@ -44,8 +48,8 @@ PATIENCE: Seconds = 0.4
 class _Kept(Struct):
     """A piece. pose: as told; None: it is not told, or not any more. rests: what was seen of it since it rests.
 
-    elsewhere: the last that was seen of it, if that is not where it is told to lie. seen: when it was seen last. bare:
-    since when its place is.
+    elsewhere: the last that was seen of it, if that is not where it is told to lie. seen: when it was seen last.
+    bare: since when its place is.
     """
 
     form: Form
@@ -94,6 +98,9 @@ def _see(kept: _Kept, piece: SpottedPiece, at: Seconds) -> None:
     kept.seen, kept.bare = at, None
     kept.is_covered = False
     before, kept.elsewhere = kept.elsewhere, None
+    if kept.pose is not None and piece.seen < WHOLE and _is_near(piece, kept.pose):
+        kept.velocity = (0.0, 0.0)
+        return  # a hand is over it
     if kept.pose is not None and not _is_elsewhere(piece, kept.pose):
         kept.velocity = (0.0, 0.0)
         kept.rests.append((at, piece))
@@ -124,6 +131,10 @@ def _miss(kept: _Kept, at: Seconds, *, is_bare: bool) -> None:
         kept.rests.clear()
     if kept.bare is not None and at - kept.bare >= PATIENCE:
         kept.pose = None
+
+
+def _is_near(piece: SpottedPiece, told: SpottedPiece) -> bool:
+    return math.dist((piece.x, piece.y), (told.x, told.y)) < NEAR
 
 
 def _is_elsewhere(piece: SpottedPiece, told: SpottedPiece) -> bool:

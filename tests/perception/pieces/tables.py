@@ -83,13 +83,18 @@ class Hand(NamedTuple):
 def corners(id: str, pose: Pose) -> Floats:
     x, y, turn = pose
     c, s = math.cos(turn), math.sin(turn)
-    return FOOTPRINTS[id] @ np.array([[c, s], [-s, c]]) + [x, y]
+    return np.asarray(FOOTPRINTS[id] @ np.array([[c, s], [-s, c]]) + [x, y])
 
 
 def drawn(
-    poses: Mapping[str, Pose], eye: Eye = EYE, light: Light = EVEN, hand: Hand | None = None, seed: int = 0
+    poses: Mapping[str, Pose],
+    eye: Eye = EYE,
+    light: Light = EVEN,
+    hand: Hand | None = None,
+    seed: int = 0,
+    take: int = 0,
 ) -> Picture:
-    """A picture, red, green and blue."""
+    """A picture, red, green and blue. seed: of sun and grain; take: of the noise."""
     rng = np.random.default_rng(seed)
     sun = np.array([*rng.uniform(-0.6, 0.6, 2), 1.0])
     sun /= np.linalg.norm(sun)
@@ -143,8 +148,8 @@ def drawn(
     tint = np.array([1, rng.uniform(0.94, 1.0), rng.uniform(0.86, 1.0)])
     shown = albedo * ((0.45 + 0.55 * bright) * (1 + gx * x + gy * y) * tint * light.strength).astype(np.float32)
     shown = cv2.GaussianBlur(shown, (0, 0), light.blur)
-    shown += light.noise * rng.standard_normal(shown.shape, np.float32)
-    return np.clip(shown, 0, 255).astype(np.uint8)
+    shown += light.noise * np.random.default_rng([seed, take]).standard_normal(shown.shape, np.float32)
+    return np.asarray(np.clip(shown, 0, 255), np.uint8)
 
 
 def hull(*outlines: Any) -> Any:
