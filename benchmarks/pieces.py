@@ -2,8 +2,8 @@
 
 python benchmarks/pieces.py [--tables 500] [--json]
 
-A fifth of the tables each: even light; noise 20; the same in light of 1.5 and of 0.45; and with a hand that comes over
-the table once it has been seen. Colors are learned from one picture of other light and noise.
+A fifth of the tables each: even light; noise 20; the same in light of 1.5 and of 0.45; and with a hand that comes
+over the table once it has been seen. Colors are learned from one picture of other noise and another sun.
 """
 
 import argparse

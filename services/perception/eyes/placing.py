@@ -1,11 +1,11 @@
 """Place of a camera, and how wide it sees, from pictures of a printed sheet, or of somebody at a known seat. Pure.
 
 The sheet has twelve markers of ArUco. Held at a slant, nearer and farther, it tells how wide the camera sees: what is
-twice as far is half as large, by as much as the field of view says. Laid at a known place it tells where the camera is.
-Pictures in which it only faces the camera squarely leave the field of view open, and are refused.
+twice as far is half as large, by as much as the field of view says. Laid at a known place it tells where the camera
+is. Pictures in which it only faces the camera squarely leave the field of view open, and are refused.
 
-Somebody at a known seat tells less: how far the face seems is how wide the camera sees, and where it is in the picture
-is where the camera looks; its place has to be known, and that it hangs straight.
+Somebody at a known seat tells less: how far the face seems is how wide the camera sees, and where it is in the
+picture is where the camera looks; its place has to be known, and that it hangs straight.
 """
 
 import math
@@ -27,6 +27,11 @@ MARKER: Meters = 0.055
 GAP: Meters = 0.012
 CELLS = 6
 """Fields of a marker, its border too."""
+STILL, OTHER = 1.5, 0.05
+"""Pixels by which a sheet that lies still may move; share of the width of a picture by which one has to that is held
+differently."""
+HELD, LAID = 8, 10
+"""Pictures of each kind that are enough."""
 OPEN: Degrees = 1.0
 """Standard deviation of the field of view from which on it is not known."""
 LEAST = 4
@@ -38,7 +43,7 @@ UPRIGHT = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 
 class SeenSheet(NamedTuple):
-    """The sheet in a picture. places: of the corners of its markers, from its middle. pixels: the same in the picture."""
+    """The sheet in a picture. places: of corners of its markers, from its middle. pixels: the same in the picture."""
 
     places: Floats
     pixels: Floats
@@ -114,6 +119,43 @@ class SheetFinder:
         return SeenSheet(places.reshape(-1, 3) - middle, pixels.reshape(-1, 2) + 0.5)  # OpenCV counts by middles
 
 
+class SheetViews:
+    """The pictures of a sheet that is moved to and fro, and then laid down.
+
+    moved: some in which it is held differently. laid: the last ones, since it lies still.
+    """
+
+    def __init__(self, width: int) -> None:
+        """width: of the pictures, pixels."""
+        self._width = width
+        self.moved: list[SeenSheet] = []
+        self.laid: list[SeenSheet] = []
+
+    @property
+    def are_enough(self) -> bool:
+        """True if it was held differently often enough, and lies still for long enough."""
+        return len(self.moved) > HELD and len(self.laid) >= LAID
+
+    def feed(self, seen: SeenSheet) -> None:
+        """Take what is seen in the next picture."""
+        if self.laid and _moved(self.laid[-1], seen) > STILL:
+            self.laid = []
+        self.laid.append(seen)
+        if all(_moved(other, seen) > OTHER * self._width for other in self.moved):
+            self.moved.append(seen)
+
+
+def _moved(one: SeenSheet, other: SeenSheet) -> float:
+    """Distance by which the sheet has moved, pixels, by the markers that both pictures show."""
+    pixels = {tuple(np.round(place, 4)): pixel for place, pixel in zip(one.places, one.pixels, strict=True)}
+    both = [
+        pixels[key] - pixel
+        for place, pixel in zip(other.places, other.pixels, strict=True)
+        if (key := tuple(np.round(place, 4))) in pixels
+    ]
+    return float(np.linalg.norm(both, axis=1).max()) if both else math.inf
+
+
 def placed_by_sheet(
     moved: Sequence[SeenSheet], laid: Sequence[SeenSheet], axes: Floats, at: Vector, width: int, height: int
 ) -> PlacedCamera:
@@ -180,8 +222,7 @@ def _stated(place: Floats, axes: Floats, field: Degrees, error: Degrees, beside:
     level = np.array([math.sin(pan), -math.cos(pan), 0.0])
     roll = math.atan2(-float(down @ level), float(right @ level))
     x, y, z = place.tolist()
-    angles = (math.degrees(each) for each in (tilt, pan, roll))
-    return PlacedCamera(field, (x, y, z), *angles, error, beside)
+    return PlacedCamera(field, (x, y, z), math.degrees(tilt), math.degrees(pan), math.degrees(roll), error, beside)
 
 
 def _field(focal: float, width: int) -> Degrees:

@@ -3,8 +3,8 @@
     python -m engage_hri.services.perception.eyes.watching
 
 is that process, for eyes; each sense that sees has such a module of its own. It is told which source to open, and
-then of each picture that the service has taken: a film waits for that, a camera goes on with the newest. What a driver
-of a camera blocks, blocks there.
+then of each picture that the service has taken: a film waits for that, a camera goes on with the newest. What a
+driver of a camera blocks, blocks there.
 """
 
 import asyncio

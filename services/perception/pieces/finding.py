@@ -68,7 +68,7 @@ LEAST_SEEN, MOST_FOREIGN, MOST_BEYOND = 0.35, 0.2, 0.45
 """Share of a form that must have its color, and may have another; of its surroundings that may have its color."""
 BARE = 0.06
 """Share by which the place of a piece that is away may differ from the color of the table."""
-LEAST, SAME, CERTAIN = 0.3, 1.3, 1.75
+LEAST, SAME, CERTAIN = 1.0, 1.3, 1.75
 """Score of what is a piece at all; of one that is where it was, so that it is not looked for; of one that is so well
 found that no other place is tried. At most it is 2."""
 AGAIN = 10
@@ -115,6 +115,7 @@ class FlatTable:
         self._map = cv2.getPerspectiveTransform(square - np.float32(0.5), (pixels - 0.5).astype(np.float32))
         self.is_table = np.zeros((self.rows, self.columns), np.uint8)
         cv2.fillConvexPoly(self.is_table, np.rint(self.at(corners)[:, ::-1]).astype(np.int32), 1)
+        self.is_table = cv2.erode(self.is_table, np.ones((5, 5), np.uint8))  # its edge is of no color
         self.eye = np.array(eye[:2], float)
         self.sunk = (eye[2] - top) / (eye[2] - z)
         """Scale about the eye that brings an outline on the table to where the plane of the tops shows it."""
@@ -234,8 +235,9 @@ class PieceFinder:
         return found, bare
 
     def _is_bare(self, flat: Any, around: Any, shape: _Shape) -> bool:
-        """Tell whether the table is seen where a form lay last. Skin may be like it in another light: in this very one
-        it has to be, on average.
+        """Tell whether the table is seen where a form lay last.
+
+        Skin may be like it in another light: on average it has to be like it in this one.
         """
         if (pose := self._last.get(shape.form.id)) is None:
             return False

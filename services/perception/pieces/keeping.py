@@ -3,7 +3,7 @@
 A piece is measured to a millimetre, and differently in each picture. Told so, a square that touches the top of a
 rectangle would touch its top left now and then, and nothing would ever rest. So a piece that is told to lie somewhere
 lies there until it is seen to be elsewhere by more than measuring errs, twice: what follows from its pose, as what it
-touches, holds as long. While it rests, the median of the last second mends its place, in steps that are no smaller
+touches, holds as long. While it rests, the median of the last seconds mends its place, in steps that are no smaller
 than `NUDGE`.
 
 A piece that is not seen is covered: it stays where it was, with little confidence. Where it lay the bare table is
@@ -30,11 +30,11 @@ AWAY: Meters = 0.004
 TURNED: Radians = math.radians(4.0)
 WHOLE: Probability = 0.9
 NEAR: Meters = 0.02
-"""Share of a piece that is not seen to have moved, by less than this distance, unless so much of it is in view: what is
-covered in part is measured worse."""
+"""Share of a piece that has to be in view for it to have moved by less than this distance: what is covered in part is
+measured worse."""
 NUDGE: Meters = 0.001
 TWIST: Radians = math.radians(1.0)
-WINDOW: Seconds = 1.0
+WINDOW: Seconds = 5.0
 FEWEST = 3
 """Pictures of a piece at rest from which on their median counts."""
 STILL = 0.03
