@@ -60,6 +60,8 @@ TOLERANCE: Meters = 0.001
 CORRELATED = 8.0
 """How many points of an edge err alike: what blurs a picture, and grains of a table, are larger than `SPACING`."""
 ROUNDS = 7
+BESIDE = np.array([[0.004, 0.0, 0.0], [-0.004, 0.0, 0.0], [0.0, 0.004, 0.0], [0.0, -0.004, 0.0]])
+"""Steps to places beside, and their turns."""
 SMALL: Meters = 0.0001
 """Step after which the next would change nothing."""
 UNEVEN = 0.15
@@ -283,7 +285,10 @@ class PieceFinder:
         for pose in self._likely(seen.tops, shape):
             best = max(best, self._moved(seen, shape, pose), key=lambda laid: laid.score)
             if best.score > CERTAIN:
-                break
+                return best
+        # One edge of a top and the foot of another wall may agree on a place beside the right one.
+        for beside in BESIDE if best.score > 0 else ():
+            best = max(best, self._moved(seen, shape, best.pose + beside), key=lambda laid: laid.score)
         return best
 
     def _tops(self, flat: Any, value: Any) -> Any:
