@@ -36,11 +36,14 @@ def calibrated_camera(options: "Options") -> int:
     if options.at is None:
         advice = "--at X Y Z, in the robot's frame: metres ahead of it, to its left, and up from the floor"
         raise InputRefused(Fault(reason="it is not said where the sheet lies, or who sits there", advice=advice))
+    if options.seat and options.what != "eyes":
+        raise InputRefused(Fault(reason="--seat is for eyes", advice="engage calibrate eyes --seat --at X Y Z"))
     out = ResultFile(options.out or Path(f"{options.what}.toml"))
-    camera: AttachedCamera = getattr(options.load(), options.what)
-    source: str = options.source or camera.source
+    config = options.load()
+    camera = config.pieces if options.what == "pieces" else config.eyes
+    source = options.source or camera.source
     if options.seat:
-        found, pictures = _by_seat(options.load(), source, options.at)
+        found, pictures = _by_seat(config, source, options.at)
     else:
         found, pictures = _by_sheet(camera, options.what, source, options.at, options.upright)
     settings = {name: _rounded(getattr(found, name)) for name in ("field_of_view", "place", "tilt", "pan", "roll")}

@@ -115,9 +115,9 @@ class FlatTable:
         pixels = camera.pixels(places, width, height)
         # OpenCV counts pixels by their middles.
         self._map = cv2.getPerspectiveTransform(square - np.float32(0.5), (pixels - 0.5).astype(np.float32))
-        self.is_table = np.zeros((self.rows, self.columns), np.uint8)
-        cv2.fillConvexPoly(self.is_table, np.rint(self.at(corners)[:, ::-1]).astype(np.int32), 1)
-        self.is_table = cv2.erode(self.is_table, np.ones((5, 5), np.uint8))  # its edge is of no color
+        inside = np.zeros((self.rows, self.columns), np.uint8)
+        cv2.fillConvexPoly(inside, np.rint(self.at(corners)[:, ::-1]).astype(np.int32), 1)
+        self.is_table = np.asarray(cv2.erode(inside, np.ones((5, 5), np.uint8)), np.uint8)  # its edge is of no color
         self.eye = np.array(eye[:2], float)
         self.sunk = (eye[2] - top) / (eye[2] - z)
         """Scale about the eye that brings an outline on the table to where the plane of the tops shows it."""
