@@ -173,7 +173,7 @@ def placed_by_sheet(
         [view.places.astype(np.float32) for view in views], [view.pixels.astype(np.float32) for view in views],
         (width, height), start, np.zeros(5), flags=flags,
     )  # fmt: skip
-    focal, spread = float(matrix[0, 0]), float(spreads.ravel()[0])
+    focal, spread = float(matrix[0, 0]), float(spreads.ravel()[:2].max())  # one of the two is held to the other
     error = _field(focal, width) - _field(focal + spread, width) if focal > 0 and spread > 0 else math.inf
     if error > OPEN:
         advice = "before it is laid down hold it at a slant, to all sides, nearer and farther"
