@@ -62,9 +62,9 @@ LAYERS = {
     "services/control": "mujoco reachy_mini torso > figure service testing > bases calibrating serving voice"
     " > contract > config motion",
     "services/perception": "pieces > eyes hearing > attached child offered pictures",
-    "services/perception/eyes": "service > watching > sources > seeing > nodding tracking"
+    "services/perception/eyes": "service > watching > sources > placing seeing > nodding tracking"
     " > camera head_pose one_euro > looking > packages > config",
-    "services/perception/pieces": "service > keeping sources > spotting > finding > colors > config",
+    "services/perception/pieces": "service > watching > keeping sources > finding > spotting > colors > config",
     "services/perception/hearing": "service > device pages > intake > speeches"
     " > company listening microphone own_voice recognizers > recognizing sound > voice > config",
     "services/commandline": "look robot study talk > app bodies embedding > shell",

@@ -1,4 +1,4 @@
-"""What is known of a task before a picture is seen: its table, which its file tells, and the colors of its pieces."""
+"""Knowledge of a task before a picture is seen: its table, which its file tells, and the colors of its pieces."""
 
 from pathlib import Path
 

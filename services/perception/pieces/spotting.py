@@ -36,8 +36,8 @@ class SpottedPiece(Struct, frozen=True):
 
 
 class SpottedPieces(Struct, frozen=True, kw_only=True, tag=True):
-    """What is seen of a table in a picture. at: when it was taken. bare: ids of pieces that were seen before, and of
-    which the table is seen now where they lay. A piece that is neither here nor there is covered."""
+    """Pieces that are seen in a picture. at: when it was taken. bare: ids of those where the table is seen now that
+    were seen before. A piece that is neither here nor there is covered."""
 
     at: Stamp
     pieces: tuple[SpottedPiece, ...] = ()
