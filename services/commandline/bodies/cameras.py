@@ -50,7 +50,8 @@ def calibrated_camera(options: "Options") -> int:
     measured = (
         f"{pictures}; what is seen is {found.beside:.2f} pixels beside, the field within {found.error:.2f} degrees"
     )
-    text = msgspec.toml.encode({options.what: settings}).decode()
+    rows = (f"{name} = {msgspec.json.encode(value).decode()}" for name, value in settings.items())
+    text = "\n".join([f"[{options.what}]", *rows, ""])
     out.write(f"# engage calibrate {options.what}: {measured}\n{text}".encode())
     print(
         text.strip(),
