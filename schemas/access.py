@@ -272,6 +272,7 @@ PARTICIPANTS = {
     "simulation": "perception",
     "hearing": "perception",
     "eyes": "perception",
+    "pieces": "perception",
     "collaboration": "manager",
 }
 """Roles of the services that have another name."""

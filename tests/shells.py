@@ -30,7 +30,7 @@ SHELLS = {
     "services/perception/eyes/pages.py",  # takes what cameras of pages see
     "services/perception/eyes/people.py",  # publishes people and heads
     "services/perception/eyes/watching.py",  # runs the process of a source
-    "services/perception/eyes/sources/pictures.py",  # a camera, in that process
+    "services/perception/pictures.py",  # a camera, in the process of a source
     "services/perception/hearing/company.py",  # publishes people and faults
     "services/perception/hearing/device.py",  # waits for sound, and for a device that is gone
     "services/perception/hearing/intake.py",  # takes what others tell

@@ -61,9 +61,10 @@ LAYERS = {
     " keyring",
     "services/control": "mujoco reachy_mini torso > figure service testing > bases calibrating serving voice"
     " > contract > config motion",
-    "services/perception": "testing > eyes hearing > child offered",
-    "services/perception/eyes": "service > pages > people seat > watching > sources > seeing > nodding tracking"
-    " > camera head_pose one_euro > looking > config",
+    "services/perception": "testing > pieces > eyes hearing > attached child offered pictures",
+    "services/perception/eyes": "service > pages > people seat > watching > sources > placing seeing"
+    " > nodding tracking > camera head_pose one_euro > looking > config",
+    "services/perception/pieces": "service > watching > keeping sources > finding > spotting > colors > config",
     "services/perception/hearing": "service > device pages > intake > speeches"
     " > company listening microphone own_voice recognizers > recognizing sound > voice > config",
     "services/commandline": "look robot study talk > app bodies embedding > shell",

@@ -50,6 +50,7 @@ CONTENTS = {
         "recognition",
         "hearing",
         "eyes",
+        "pieces",
         "control",
         "mujoco",
         "reachy-mini",

@@ -6,7 +6,7 @@ The files are parsed, not imported, because what a field means stands in the str
 import ast
 import fnmatch
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ PAGE = ROOT / "docs" / "configuration.md"
 SECTIONS = {
     "bus": "bus", "generation": "generation", "realizer": "realizer", "recognition": "recognition",
     "control": "control", "hearing": "perception/hearing",
-    "eyes": "perception/eyes",
+    "eyes": "perception/eyes", "pieces": "perception/pieces",
     "simulation": "tangram/people", "collaboration": "tangram/collaboration",
 }  # fmt: skip
 """Folder of each section."""
@@ -106,6 +106,7 @@ def _named(names: str, fields: Sequence[str]) -> list[str]:
 
 def _keys(node: ast.ClassDef, module: ast.Module) -> tuple[str, list[Key]]:
     """What the class says in general, and its fields: documented below them or in the class's docstring."""
+    inherited = _inherited(node, module)
     assigned = [s for s in node.body if isinstance(s, ast.AnnAssign) and isinstance(s.target, ast.Name)]
     fields = [field for field in assigned if "ClassVar" not in ast.unparse(field.annotation)]
     names = [ast.unparse(field.target) for field in fields]
@@ -117,8 +118,41 @@ def _keys(node: ast.ClassDef, module: ast.Module) -> tuple[str, list[Key]]:
             documented[name] = str(below[0].value.value)
         default = ast.unparse(_value(field.value, module)) if field.value else ""
         meaning = _cell(documented.get(name, ""))
+        base = inherited.pop(name, None)
+        if base is not None and not meaning:
+            meaning = base.meaning
         keys.append(Key(name, _cell(_kind(field.annotation, module)), _cell(default), _capitalized(meaning)))
-    return general, keys
+    return general, [*keys, *inherited.values()]
+
+
+def _inherited(node: ast.ClassDef, module: ast.Module) -> dict[str, Key]:
+    """Fields of the classes of this project from which a class inherits, by name."""
+    found: dict[str, Key] = {}
+    for base in node.bases:
+        for other, tree in _imported(ast.unparse(base), module):
+            if isinstance(other, ast.ClassDef):
+                found |= {key.name: key for key in _keys(other, tree)[1]}
+    return found
+
+
+def _imported(name: str, module: ast.Module) -> Iterator[tuple[ast.stmt, ast.Module]]:
+    """Statements that make a name which is imported from this project, and the module in which they stand."""
+    for statement in module.body:
+        if (
+            isinstance(statement, ast.ImportFrom)
+            and statement.module is not None
+            and statement.module.startswith("engage_hri.")
+            and any(alias.name == name for alias in statement.names)
+        ):
+            place = ROOT.joinpath(*statement.module.split(".")[1:]).with_suffix(".py")
+            tree = ast.parse(place.read_text(encoding="utf-8"))
+            yield from ((each, tree) for each in tree.body if _makes(each, name))
+
+
+def _makes(statement: ast.stmt, name: str) -> bool:
+    return getattr(statement, "name", None) == name or (
+        isinstance(statement, ast.AnnAssign) and ast.unparse(statement.target) == name
+    )
 
 
 def _kind(annotation: ast.expr, module: ast.Module) -> str:
@@ -136,17 +170,10 @@ def _kind(annotation: ast.expr, module: ast.Module) -> str:
 
 def _value(default: ast.expr, module: ast.Module) -> ast.expr:
     """The default as written, with a constant from another module of this project in place of its name."""
-    for statement in module.body:
-        if (
-            isinstance(default, ast.Name)
-            and isinstance(statement, ast.ImportFrom)
-            and statement.module is not None
-            and any(alias.name == default.id for alias in statement.names)
-        ):
-            place = ROOT.joinpath(*statement.module.split(".")[1:]).with_suffix(".py")
-            for other in ast.parse(place.read_text(encoding="utf-8")).body:
-                if isinstance(other, ast.AnnAssign) and ast.unparse(other.target) == default.id and other.value:
-                    return other.value
+    if isinstance(default, ast.Name):
+        for made, _ in _imported(default.id, module):
+            if isinstance(made, ast.AnnAssign) and made.value:
+                return made.value
     return default
 
 

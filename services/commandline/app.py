@@ -64,8 +64,8 @@ FAMILIES: dict[str, dict[str, str]] = {
         "new-body": "Write a file with the driver of a robot that takes set points, to go on from.",
         "check-body": "Hold a body to the contract of bodies, and tell where it breaks which. Exit 1 if it breaks"
         " one.",
-        "calibrate": "Measure where a body really looks and points, and write a file that corrects it (calibrate "
-        "body). Exit 2 if nobody sees where it points.",
+        "calibrate": "Measure where a body really looks and points (calibrate body), where a camera stands (eyes, "
+        "pieces), or the colors of pieces (colors), and write a file. Exit 2 if nobody sees where it points.",
         "fault": "Switch faults of a running robot's simulated body on and off, or list what it can play. Exit 2 "
         "if it cannot play them.",
     },

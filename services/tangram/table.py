@@ -3,26 +3,21 @@
 Simulation and the collaboration manager both read `table.toml` through this file, so that there is one table.
 """
 
-import math
 from functools import cache
 from pathlib import Path
 
 import msgspec
 from msgspec import Struct
 
-from engage_hri.schemas.footprints import PiecePose, Point
+from engage_hri.schemas.footprints import PiecePose
+from engage_hri.schemas.tables import Form, TableTop, TaskTable
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity
 
 
-class Piece(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A piece. start: its pose when the human comes. goal: in the finished figure. footprint: counterclockwise."""
+class Piece(Form, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A piece. start: its pose when the human comes. goal: in the finished figure."""
 
-    id: str
-    color: str
-    shape: str
-    footprint: tuple[Point, ...]
-    start: PiecePose
     goal: PiecePose
 
 
@@ -33,16 +28,13 @@ class TablePerson(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     right_hand: Vector
 
 
-class Surface(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Surface(TableTop, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The table top. free: where nothing is ever laid; people who look at the table and at no piece look there."""
 
-    id: str
-    center: Vector
-    footprint: tuple[Point, ...]
     free: Vector
 
 
-class TangramTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class TangramTable(TaskTable, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The table with all its pieces. base: the piece that is never moved; the figure grows around it."""
 
     base: str
@@ -53,20 +45,6 @@ class TangramTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     def piece(self, id: str) -> Piece:
         """Find a piece. Raises KeyError if there is none with that id."""
         return {piece.id: piece for piece in self.pieces}[id]
-
-    def lying(self, piece: Piece, pose: PiecePose) -> Entity:
-        """The piece as perception reports it when it lies at `pose`."""
-        return Entity(
-            id=piece.id,
-            kind="object",
-            position=(pose.x, pose.y, self.surface.center[2]),
-            yaw=math.radians(pose.yaw),
-            footprint=piece.footprint,
-            radius=max(math.hypot(x, y) for x, y in piece.footprint),
-            color=piece.color,
-            shape=piece.shape,
-            name=f"{piece.color} {piece.shape}",
-        )
 
     def figure(self) -> tuple[Entity, ...]:
         """Every piece at its place in the finished figure."""

@@ -1,6 +1,7 @@
-"""Command `engage calibrate body`: measure where a body really looks and points, and write what corrects it."""
+"""Command `engage calibrate`: measure where a body really looks and points, where a camera stands, or which colors
+pieces have, and write what corrects it.
+"""
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,7 @@ from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity
 from engage_hri.services.commandline.shell.options import Configured
 from engage_hri.services.commandline.shell.process import DONE, run, typed
+from engage_hri.services.commandline.shell.result_file import ResultFile
 from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.control.calibrating.fitting import Fit, Measurement, fit
 from engage_hri.services.control.calibrating.measuring import OTHER_ROWS, Eyes, SimulatedEyes, marks, measured
@@ -27,10 +29,38 @@ FEWEST = 3
 
 @dataclass(frozen=True, kw_only=True)
 class Options(Configured):
-    what: Annotated[Literal["body"], typer.Argument(metavar="body", help="What is calibrated.")]
-    out: Annotated[Path, typer.Option(metavar="FILE", help="Where the calibration is written.")] = Path(
-        "calibration.toml"
-    )
+    what: Annotated[
+        Literal["body", "eyes", "pieces", "colors"],
+        typer.Argument(
+            metavar="body|eyes|pieces|colors",
+            help="The robot's body; the camera of eyes, or of pieces; or the colors of the pieces.",
+        ),
+    ]
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Where the result is written.", show_default="calibration, or WHAT.toml"),
+    ] = None
+    source: Annotated[
+        str | None,
+        typer.Option(
+            "--from", metavar="SOURCE", help="Pictures: camera, or film:PATH.", show_default="the settings'"
+        ),
+    ] = None
+    sheet: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the sheet of markers to print, as SVG; nothing is measured."),
+    ] = None
+    at: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(
+            metavar="X Y Z", help="Where the sheet lies, its middle, or who sits there has the eyes; metres."
+        ),
+    ] = None
+    upright: Annotated[bool, typer.Option("--upright", help="The sheet stands, facing the robot.")] = False
+    seat: Annotated[bool, typer.Option("--seat", help="Somebody sits there; no sheet is needed.")] = False
+    task: Annotated[
+        str | None, typer.Option(metavar="TASK", help="Whose pieces have these colors: a task's name, or its file.")
+    ] = None
     part: Annotated[
         list[str] | None,
         typer.Option(metavar="PART", help="head, left_arm or right_arm; may be repeated.", show_default="all it has"),
@@ -49,29 +79,6 @@ class Options(Configured):
     spread: Annotated[
         float, typer.Option(metavar="METRES", min=0.0, help="How well simulated eyes measure a place.")
     ] = 0.003
-
-
-class ResultFile:
-    """File for a result. Raises InputRefused if it cannot be written."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        folder, reason = path.parent, ""
-        if path.is_dir():
-            reason = "is a folder"
-        elif not folder.is_dir():
-            reason = f"there is no folder {folder}"
-        elif not os.access(path if path.exists() else folder, os.W_OK):
-            reason = "cannot be written"
-        if reason:
-            raise InputRefused(Fault(reason=reason, where=str(path)))
-
-    def write(self, content: bytes) -> None:
-        """Write the whole. Raises RunFailed."""
-        try:
-            self.path.write_bytes(content)
-        except OSError as error:
-            raise RunFailed(Fault(reason=f"cannot write: {error.strerror}", where=str(self.path))) from error
 
 
 class AskedEyes:
@@ -109,6 +116,11 @@ class AskedEyes:
 
 
 def main(options: Options) -> int:
+    if options.what != "body":
+        from engage_hri.services.commandline.bodies.cameras import calibrated_camera, learned_colors
+
+        made = learned_colors if options.what == "colors" else calibrated_camera
+        return made(options)
     config = options.load()
     parts = tuple(options.part or PARTS)
     if unknown := [part for part in parts if part not in PARTS]:
@@ -116,7 +128,10 @@ def main(options: Options) -> int:
             Fault(reason=f"no part {unknown[0]!r}", where="--part", advice=f"known: {', '.join(PARTS)}")
         )
     known = None if options.measurements is None else read_measurements(options.measurements)
-    out, record = ResultFile(options.out), None if options.record is None else ResultFile(options.record)
+    out, record = (
+        ResultFile(options.out or Path("calibration.toml")),
+        None if options.record is None else ResultFile(options.record),
+    )
     run(_calibrate(options, config, parts, known, out, record), virtual_time=not options.ask)
     return DONE
 
@@ -162,7 +177,7 @@ async def _calibrate(
     out.write(written(Calibration(offsets=offsets, errors=errors), body.capabilities.body, told).encode())
     for part, lines in told.items():
         print("\n    ".join((f"{part}: {lines[0]}", *lines[1:], f"within {errors[part]:.2f} degrees 19 times in 20")))
-    print(f"written: {options.out}; it counts with control.calibration={options.out}")
+    print(f"written: {out.path}; it counts with control.calibration={out.path}")
 
 
 def _eyes(options: Options, body: Body) -> Eyes | None:

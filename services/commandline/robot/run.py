@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import typer
+from msgspec import json
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.bus.interface import Hub
@@ -38,12 +39,22 @@ class Options(Embodied, Hearing, Listening):
             autocompletion=lambda: list(roster.NAMES),
         ),
     ]
+    task: Annotated[
+        str | None,
+        typer.Option(metavar="TASK", help="What pieces lie there: a task's name, or its file.", show_default=False),
+    ] = None
     attended: Annotated[bool, typer.Option("--attended", hidden=True)] = False
 
     @property
     def sense(self) -> str:
         """Section of the service for which the source is."""
-        return "eyes" if "eyes" in roster.group(self.services) else "hearing"
+        return next((name for name in ("eyes", "pieces") if name in roster.group(self.services)), "hearing")
+
+    @property
+    def overrides(self) -> tuple[str, ...]:
+        """Settings of the options, which are stronger than `--set`."""
+        own = (f"pieces.task={json.encode(self.task).decode()}",) if self.task else ()
+        return (*super().overrides, *own)
 
 
 def ready_line(name: str) -> str:
@@ -58,7 +69,9 @@ def main(options: Options) -> int:
         raise InputRefused(Fault(reason="--body and --voice are for control", advice="engage run control --body ..."))
     if options.source and len({*names} & {*SENSES}) != 1:
         advice = "engage run hearing --from FILE.wav, or engage run eyes --from film:PATH"
-        raise InputRefused(Fault(reason="--from is for hearing or eyes, one of them", advice=advice))
+        raise InputRefused(Fault(reason="--from is for hearing, eyes or pieces, one of them", advice=advice))
+    if options.task and "pieces" not in names:
+        raise InputRefused(Fault(reason="--task is for pieces", advice="engage run pieces --task FILE"))
     if options.attended:
         end_after_the_parent()
     on_robot = {*names} <= {*ROBOT, *SENSES}

@@ -132,7 +132,8 @@ class Hearing(Configured):
             "--from",
             metavar="SOURCE",
             help="What hearing hears: page, the microphones of the pages of windows; a program that records "
-            "(arecord); a WAV file. What eyes see: camera; film:PATH; landmarks:RECORDING.",
+            "(arecord); a WAV file. What eyes see: camera; film:PATH; landmarks:RECORDING. What pieces are seen "
+            "in: camera; film:PATH.",
             show_default=False,
         ),
     ] = None

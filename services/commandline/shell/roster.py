@@ -21,7 +21,7 @@ ROBOT: tuple[str, ...] = keys.SERVICES
 """Services of a robot; the others play the person, the table and the task. An installed package offers those."""
 TASK = "collaboration"
 """Service that ends by itself, with the task."""
-SENSES = ("hearing", "eyes")
+SENSES = ("hearing", "eyes", "pieces")
 """Services that find out what people do from sensors; a robot may do without."""
 PLAY = (*ROBOT, *ELSEWHERE)
 """A robot with simulated people and their task: nothing of it needs a device."""

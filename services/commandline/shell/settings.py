@@ -9,6 +9,7 @@ from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.perception.eyes.config import EyesConfig
 from engage_hri.services.perception.hearing.config import PAGE, HearingConfig
+from engage_hri.services.perception.pieces.config import PiecesConfig
 from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.recognition.config import RecognitionConfig
 
@@ -39,6 +40,7 @@ class RobotConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     control: ControlConfig = ControlConfig()
     hearing: HearingConfig = HearingConfig()
     eyes: EyesConfig = EyesConfig()
+    pieces: PiecesConfig = PiecesConfig()
 
     def __post_init__(self) -> None:
         not_negative(self, ("covered_for",))

@@ -16,26 +16,21 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-from msgspec import Struct
 from numpy.typing import NDArray
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.landmarks import EIGHTHS, FACE_POINTS, FaceLandmarks, FacePoints
 from engage_hri.schemas.units import Probability
 from engage_hri.services.perception.eyes.config import EyesConfig
+from engage_hri.services.perception.pictures import PictureSettings
 
 Floats = NDArray[np.float64]
 
 
-class SourceSettings(Struct, frozen=True, kw_only=True):
-    """Settings of a source. path: file or folder, empty of a live one. device, rate, width, height: as in
+class SourceSettings(PictureSettings, frozen=True, kw_only=True):
+    """Settings of a source. path: file or folder, empty of a live one. device, rate, width, height, most_faces: as in
     `EyesConfig`. models: folder in which `engage eyes install` keeps them."""
 
-    path: str = ""
-    device: int = 0
-    rate: float = 15.0
-    width: int = 640
-    height: int = 480
     most_faces: int = 4
     models: str = ""
 

@@ -80,7 +80,8 @@ class Seeing:
     """The people before one camera. camera: None: where the settings say that it stands."""
 
     def __init__(self, config: EyesConfig, camera: StatedCamera | SeatCamera | None = None) -> None:
-        self._camera = camera or StatedCamera(config.field_of_view, config.place, config.tilt, config.pan)
+        stated = StatedCamera(config.field_of_view, config.place, config.tilt, config.pan, config.roll)
+        self._camera = camera or stated
         self._tracker = FaceTracker()
         self._known: dict[str, _Known] = {}
         self._at = float("-inf")

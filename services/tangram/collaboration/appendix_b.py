@@ -5,8 +5,8 @@ no such step.
 """
 
 from engage_hri.schemas.footprints import Side
+from engage_hri.schemas.relations import Relation
 from engage_hri.services.tangram.collaboration.plans import Manager, Turn
-from engage_hri.services.tangram.collaboration.relations import Relation
 from engage_hri.services.tangram.collaboration.task import Instruction
 
 AS_IN_STEP_19 = Relation("purple-triangle", "top right", "trapezoid")

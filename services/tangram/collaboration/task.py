@@ -8,9 +8,9 @@ from collections.abc import Collection, Iterable
 
 from msgspec import Struct
 
+from engage_hri.schemas.relations import Relation, relation, relations
 from engage_hri.schemas.world import Entity
 from engage_hri.services.tangram.collaboration.placement import TRUSTED
-from engage_hri.services.tangram.collaboration.relations import Relation, relation, relations
 from engage_hri.services.tangram.table import TangramTable
 
 

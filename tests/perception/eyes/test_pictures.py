@@ -30,7 +30,8 @@ needs_eyes()
 import cv2  # noqa: E402
 
 from engage_hri.services.perception.eyes.sources.litert import FaceFinder  # noqa: E402
-from engage_hri.services.perception.eyes.sources.pictures import Blindness, CameraBlind, FilmSource  # noqa: E402
+from engage_hri.services.perception.eyes.sources.pictures import FilmSource  # noqa: E402
+from engage_hri.services.perception.pictures import Blindness, CameraBlind  # noqa: E402
 
 PLACE = (0.1, 0.02, 0.75)
 
@@ -146,7 +147,7 @@ def test_without_models_it_is_said_how_to_have_them(tmp_path: Path):
 
 @pytest.mark.parametrize("kind", ["black", "the same"])
 def test_a_camera_that_gives_nothing_to_see_is_told_and_says_nothing_of_people(kind: str):
-    blindness, chance, image = Blindness(), np.random.default_rng(1), picture(0, Pose(PLACE))
+    blindness, chance, image = Blindness("eyes.source"), np.random.default_rng(1), picture(0, Pose(PLACE))
     dark = [chance.integers(0, 8, image.shape).astype(np.uint8) for _ in range(60)]
     given = dark if kind == "black" else [image] * 60
 
@@ -164,7 +165,7 @@ def test_a_camera_that_gives_nothing_to_see_is_told_and_says_nothing_of_people(k
 
 
 def test_a_camera_that_sees_again_is_not_blind():
-    blindness = Blindness()
+    blindness = Blindness("eyes.source")
     for k in range(150):
         image = np.zeros((48, 64, 3), np.uint8) if k % 20 < 10 else noisy(np.full((48, 64, 3), 90, np.uint8), 3, k)
         assert blindness.is_blind(image, k / 15) == (k % 20 < 10)

@@ -70,4 +70,4 @@ async def test_without_models_the_command_says_how_to_have_them(tmp_path: Path):
 
 def test_a_source_is_for_one_of_the_senses(capsys: pytest.CaptureFixture[str]):
     told = engage(capsys)("run", "realizer", "--from", "film:x")
-    assert (told.code, "--from is for hearing or eyes" in told.err) == (2, True)
+    assert (told.code, "--from is for hearing, eyes or pieces" in told.err) == (2, True)

@@ -1,0 +1,56 @@
+"""Knowledge of a task before a picture is seen: its table, which its file tells, and the colors of its pieces."""
+
+from pathlib import Path
+
+import msgspec
+
+from engage_hri.schemas.advice import suggestion
+from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.tables import TaskTable
+from engage_hri.services.runtime.installation import TABLES, offers
+
+Palette = dict[str, tuple[float, float, float]]
+"""Red, green and blue of each color, and of the table, under the same light."""
+TABLE = "table"
+
+
+def task_table(task: str) -> TaskTable:
+    """Read the table of a task. task: as in the settings. Raises InputRefused."""
+    known = {offer.name: offer for offer in offers(TABLES)}
+    if task in known:
+        table: TaskTable = known[task].load()()
+        return table
+    try:
+        return msgspec.toml.decode(Path(task).read_bytes(), type=TaskTable)
+    except OSError as error:
+        advice = suggestion(task, [*known]) or f"a file, or one of {', '.join(sorted(known))}"
+        raise InputRefused(
+            Fault(reason=error.strerror or str(error), where=f"pieces.task: {task}", advice=advice)
+        ) from error
+    except msgspec.DecodeError as error:
+        advice = "docs/pieces.md shows such a file"
+        raise InputRefused(Fault(reason=str(error), where=task, advice=advice)) from error
+
+
+def read_palette(path: str, table: TaskTable) -> Palette:
+    """Read the colors of the pieces of a table. Raises InputRefused: there is no such file, or it lacks one."""
+    advice = "lay out the pieces as the task begins, and: engage calibrate colors"
+    try:
+        palette: Palette = msgspec.toml.decode(Path(path).read_bytes(), type=Palette)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputRefused(Fault(reason=reason, where=f"pieces.colors: {path}", advice=advice)) from error
+    except msgspec.DecodeError as error:
+        raise InputRefused(Fault(reason=str(error), where=path, advice=advice)) from error
+    needed = {TABLE, *(form.color for form in table.pieces)}
+    if missing := sorted(needed - palette.keys()):
+        raise InputRefused(Fault(reason=f"it has no color {', '.join(missing)}", where=path, advice=advice))
+    return {name: palette[name] for name in sorted(needed)}
+
+
+def written_palette(palette: Palette) -> str:
+    """Write colors as a file."""
+    rows = (
+        f"{msgspec.json.encode(name).decode()} = [{', '.join(f'{v:.0f}' for v in palette[name])}]" for name in palette
+    )
+    return "\n".join(["# red, green and blue, 0..255, under one light: engage calibrate colors", *rows, ""])

@@ -1,0 +1,161 @@
+"""The pieces of a table as they are told, from what is spotted in one picture after the other. Pure.
+
+A piece is measured to a millimetre, and differently in each picture. Told so, a square that touches the top of a
+rectangle would touch its top left now and then, and nothing would ever rest. So a piece that is told to lie somewhere
+lies there until it is seen to be elsewhere by more than measuring errs, twice: what follows from its pose, as what it
+touches, holds as long. While it rests, the median of the last seconds mends its place, in steps that are no smaller
+than `NUDGE`.
+
+A piece that is not seen is covered: it stays where it was, with little confidence. Where it lay the bare table is
+seen? Then somebody holds it, and it is left out; who remembers the world takes it for covered for a while
+(`CoveredObjects`).
+"""
+
+import math
+from collections import deque
+from collections.abc import Iterator
+from statistics import median
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from engage_hri.schemas.footprints import PiecePose
+from engage_hri.schemas.tables import Form, TaskTable
+from engage_hri.schemas.units import Meters, Probability, Radians, Seconds
+from engage_hri.schemas.world import Entity
+from engage_hri.services.perception.pieces.spotting import SpottedPiece, SpottedPieces
+
+AWAY: Meters = 0.004
+"""Distance, and turn, from which on a piece is elsewhere."""
+TURNED: Radians = math.radians(4.0)
+WHOLE: Probability = 0.9
+NEAR: Meters = 0.02
+"""Share of a piece that has to be in view for it to have moved by less than this distance: what is covered in part is
+measured worse."""
+NUDGE: Meters = 0.001
+TWIST: Radians = math.radians(1.0)
+WINDOW: Seconds = 5.0
+FEWEST = 3
+"""Pictures of a piece at rest from which on their median counts."""
+STILL = 0.03
+"""Metres per second: a piece that is faster moves."""
+COVERED: Probability = 0.3
+"""Confidence in where a piece lies that is not seen."""
+PATIENCE: Seconds = 0.4
+"""Time for which a piece may be missed before it is told as covered, and its place be bare before it is left out."""
+
+
+class _Kept(Struct):
+    """A piece. pose: as told; None: it is not told, or not any more. rests: what was seen of it since it rests.
+
+    elsewhere: the last that was seen of it, if that is not where it is told to lie. seen: when it was seen last.
+    bare: since when its place is.
+    """
+
+    form: Form
+    rests: deque[tuple[Seconds, SpottedPiece]]
+    pose: SpottedPiece | None = None
+    velocity: tuple[float, float] = (0.0, 0.0)
+    elsewhere: tuple[Seconds, SpottedPiece] | None = None
+    seen: Seconds = -math.inf
+    bare: Seconds | None = None
+    is_covered: bool = False
+
+
+class PieceKeeper:
+    """The pieces of a table."""
+
+    def __init__(self, table: TaskTable) -> None:
+        self._table = table
+        self._kept = {form.id: _Kept(form, deque()) for form in table.pieces}
+
+    def feed(self, spotted: SpottedPieces, at: Seconds) -> tuple[Entity, ...]:
+        """Take what is spotted in a picture. Returns all pieces as they are to be told."""
+        seen = {piece.id: piece for piece in spotted.pieces}
+        for id, kept in self._kept.items():
+            if id in seen:
+                _see(kept, _turned_alike(kept, seen[id]), at)
+            else:
+                _miss(kept, at, is_bare=id in spotted.bare)
+        return tuple(self._entities())
+
+    def _entities(self) -> Iterator[Entity]:
+        for kept in self._kept.values():
+            if kept.pose is not None:
+                pose = PiecePose(kept.pose.x, kept.pose.y, math.degrees(kept.pose.yaw))
+                confidence = COVERED if kept.is_covered else _confidence(kept.pose.seen)
+                lying = self._table.lying(kept.form, pose)
+                yield replace(lying, confidence=confidence, velocity=(*kept.velocity, 0.0))
+
+
+def _turned_alike(kept: _Kept, piece: SpottedPiece) -> SpottedPiece:
+    """The piece with the turn, of those that look the same, that is nearest to how it was told."""
+    about = kept.pose.yaw if kept.pose is not None else math.radians(kept.form.start.yaw)
+    return _with(piece, yaw=about + math.remainder(piece.yaw - about, math.tau / kept.form.turns_alike))
+
+
+def _see(kept: _Kept, piece: SpottedPiece, at: Seconds) -> None:
+    kept.seen, kept.bare = at, None
+    kept.is_covered = False
+    before, kept.elsewhere = kept.elsewhere, None
+    if kept.pose is not None and piece.seen < WHOLE and _is_near(piece, kept.pose):
+        kept.velocity = (0.0, 0.0)
+        return  # a hand is over it
+    if kept.pose is not None and not _is_elsewhere(piece, kept.pose):
+        kept.velocity = (0.0, 0.0)
+        kept.rests.append((at, piece))
+        while kept.rests[0][0] < at - WINDOW:
+            kept.rests.popleft()
+        kept.pose = _settled(kept.pose, [each for _, each in kept.rests], piece.seen)
+        return
+    kept.elsewhere = (at, piece)
+    if before is None:
+        return  # a picture alone may err
+    since, last = before
+    pace = 1 / max(at - since, 1e-3)
+    vx, vy = (piece.x - last.x) * pace, (piece.y - last.y) * pace
+    is_moving = math.hypot(vx, vy) > STILL
+    if kept.pose is None and is_moving:
+        return  # where it is first told it lies
+    kept.pose, kept.velocity = piece, (vx, vy) if is_moving else (0.0, 0.0)
+    kept.rests.clear()
+    if not is_moving:
+        kept.elsewhere = None
+
+
+def _miss(kept: _Kept, at: Seconds, *, is_bare: bool) -> None:
+    kept.elsewhere = None
+    kept.bare = (at if kept.bare is None else kept.bare) if is_bare else None
+    if at - kept.seen >= PATIENCE:
+        kept.is_covered, kept.velocity = True, (0.0, 0.0)
+        kept.rests.clear()
+    if kept.bare is not None and at - kept.bare >= PATIENCE:
+        kept.pose = None
+
+
+def _is_near(piece: SpottedPiece, told: SpottedPiece) -> bool:
+    return math.dist((piece.x, piece.y), (told.x, told.y)) < NEAR
+
+
+def _is_elsewhere(piece: SpottedPiece, told: SpottedPiece) -> bool:
+    return math.dist((piece.x, piece.y), (told.x, told.y)) > AWAY or abs(piece.yaw - told.yaw) > TURNED
+
+
+def _settled(told: SpottedPiece, seen: list[SpottedPiece], share: Probability) -> SpottedPiece:
+    """The pose that is told on: the median of what was seen, if that is beside it by more than a nudge."""
+    told = _with(told, seen=share)
+    if len(seen) < FEWEST:
+        return told
+    x, y, yaw = (median(getattr(each, name) for each in seen) for name in ("x", "y", "yaw"))
+    if math.dist((x, y), (told.x, told.y)) <= NUDGE and abs(yaw - told.yaw) <= TWIST:
+        return told
+    return _with(told, x=x, y=y, yaw=yaw)
+
+
+def _confidence(seen: Probability) -> Probability:
+    """Confidence in a piece that is seen, in tenths: its place is known, or it would not be told as seen."""
+    return round(0.6 + 0.4 * seen, 1)
+
+
+def _with(piece: SpottedPiece, **changes: float) -> SpottedPiece:
+    return replace(piece, **changes)

@@ -1,0 +1,1 @@
+"""Sources of pieces that come with Engage."""
