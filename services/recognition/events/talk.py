@@ -164,6 +164,8 @@ class Talk(KindRecognizer):
 
     def _speaks(self, at: Seconds, confidence: Probability, face: str) -> None:
         """Take the beginning of a speech. face: whose face the person looks at."""
+        if self.speech is not None:
+            self._falls_silent(at)  # it was begun by another id, of which no end has come
         speech = self._own_speech(at, confidence, face)
         speech.told, speech.words = self._scene.told_to(self.id, at), self._writer.text_of(self.id, at)
         # What waits in line may be the robot's own turn, so that only the scene knows that it has begun.
