@@ -29,6 +29,7 @@ from engage_hri.services.recognition.events.addressing import (
     Addressees,
     FaceTimes,
     OwnSpeech,
+    Spoken,
     certain,
     likely,
 )
@@ -164,6 +165,8 @@ class Talk(KindRecognizer):
 
     def _speaks(self, at: Seconds, confidence: Probability, face: str) -> None:
         """Take the beginning of a speech. face: whose face the person looks at."""
+        if self.speech is not None:
+            self._falls_silent(at)  # it was begun by another id, of which no end has come
         speech = self._own_speech(at, confidence, face)
         speech.told, speech.words = self._scene.told_to(self.id, at), self._writer.text_of(self.id, at)
         # What waits in line may be the robot's own turn, so that only the scene knows that it has begun.
@@ -217,7 +220,7 @@ class Talk(KindRecognizer):
     def goes_on(self, action: Action, since: Seconds, at: Seconds, confidence: Probability, face: str) -> None:
         """Take an action that goes on, known only now, at `at`. It has been decided by the looks of now to whom."""
         part = SignPart(action, since, confidence)
-        if action == "speak" and any(each.overlaps(since) for each in self._speeches.values()):
+        if action == "speak" and self._has_said(since):
             known = self.speech  # it has been told by another id of the person
             if known is None or not known.is_heard:
                 return
@@ -300,7 +303,7 @@ class Talk(KindRecognizer):
             speech.actor = self.id
             if speech.until is None and not goes_on:
                 speech.until = at
-            if any(each.overlaps(speech.since, speech.until) for each in self._speeches.values()):
+            if self._has_said(speech.since, speech.until, speech):
                 self._scene.forget_spoken(speech)
                 if is_open and speech.since not in self._speeches:
                     self._writer.decide_interjection(self.id, speech.since, "noise", at)
@@ -310,6 +313,11 @@ class Talk(KindRecognizer):
             if is_open:
                 self._begin_again(speech)
         self.go_on(at)
+
+    def _has_said(self, since: Seconds, until: Seconds | None = None, but: Spoken | None = None) -> bool:
+        """True if the person has said anything else at this time, as far as it is remembered."""
+        said = [each for each in (*self._scene.spoken, *self._speeches.values()) if each.actor == self.id]
+        return any(each is not but and each.overlaps(since, until) for each in said)
 
     def _is_open(self, speech: OwnSpeech) -> bool:
         """True if a speech is not decided."""
