@@ -470,6 +470,23 @@ async def test_nobody_is_told_to_press_a_microphone_that_was_just_not_to_be_had(
 
 
 @needs_browser
+async def test_the_camera_is_offered_where_the_robot_sees_and_says_why_there_is_none(place: Place) -> None:
+    hint, button = "document.querySelector('.hint').textContent", "document.querySelector('.see')"
+    none = "navigator.mediaDevices.getUserMedia = async () => { throw new DOMException('no', 'NotFoundError'); };"
+    async with await open_hub("robot", connect=(place.endpoint,)) as hub, opened(place) as page:
+        await sit(page)
+        assert await page.value(f"{button}.hidden")
+        hub.join("eyes", "perception").declare_alive()
+        await page.until(f"!{button}.hidden")
+        await page.value(f"{none};0")
+        await press(page, ".see")
+        await page.until(f"{hint}.startsWith('The camera is off:') && {hint}.includes('none is plugged in')")
+        await press(page, ".other")
+        await page.until(f"{hint}.startsWith('Die Kamera ist aus:')")
+        assert await page.value(f"{button}.getAttribute('aria-pressed')") == "false"
+
+
+@needs_browser
 async def test_axe_finds_nothing_to_complain_of(place: Place) -> None:
     axe = resources.files("axe_core_python").joinpath("axe.min.js").read_text(encoding="utf-8")
     checks = """axe.run().then(({ violations, passes }) =>
