@@ -84,13 +84,12 @@ def _by_sheet(
 
 
 def _by_seat(config: RobotConfig, source: str, at: Vector) -> "tuple[PlacedCamera, str]":
-    from engage_hri.services.runtime.packages import data_folder
-
     from engage_hri.services.perception.eyes.camera import StatedCamera
     from engage_hri.services.perception.eyes.head_pose import head
     from engage_hri.services.perception.eyes.looking import settings_of, unpacked
     from engage_hri.services.perception.eyes.placing import placed_by_seat
     from engage_hri.services.perception.eyes.watching import FACES, SourceOrder, opened
+    from engage_hri.services.runtime.packages import data_folder
 
     eyes = msgspec.structs.replace(config.eyes, source=source)
     order = SourceOrder(source.partition(":")[0], settings_of(eyes, str(data_folder())))
