@@ -22,8 +22,9 @@ from engage_hri.services.perception.eyes.looking import packed
 from engage_hri.services.perception.eyes.sources.litert import FaceFinder
 from engage_hri.services.recognition.perceive.gaze_targets import ROBOT_FACE, SURFACE
 from engage_hri.services.tangram.table import tangram_table
+from tests.perception.eyes.drawing import Picture
 from tests.perception.eyes.fetched import MODELS
-from tests.perception.eyes.people import CAMERA, JUDGED, Light, Person, Picture, Pose, drawn
+from tests.perception.eyes.people import CAMERA, JUDGED, Light, Person, Pose, drawn
 
 RATE = 15.0
 TURN: Seconds = 0.25
