@@ -56,7 +56,7 @@ LAYERS = {
     "services": "commandline > console control doctor generation perception realizer recognition study"
     " > tangram"
     " > simulation > client > recording > reports requests > runtime > bus > text",
-    "services/text": "ear own_words > marks > pieces > patterns > ends listening",
+    "services/text": "ear own_words > marks > pieces > patterns > calling ends listening",
     "services/bus": "memory zenoh > certificates > interface > subscription > samples > config deadlines journal"
     " keyring",
     "services/control": "mujoco reachy_mini torso > figure service testing > bases calibrating serving voice"

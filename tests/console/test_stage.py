@@ -4,7 +4,7 @@ import asyncio
 import importlib.util
 import json
 from collections.abc import AsyncIterator, Iterator
-from contextlib import AsyncExitStack, asynccontextmanager
+from contextlib import asynccontextmanager
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import aiohttp
 import pytest
 
-from engage_hri import connect, perceive
 from engage_hri.services.bus.zenoh.hub import open_hub
 from tests.bus.places import free_endpoint
 from tests.console import browser
@@ -365,67 +364,6 @@ async def test_what_becomes_of_who_does_nothing_and_what_a_visitor_is_told_first
             talk((), {**pair, "to": "ben"}): "", talk((), {**pair, "met": True}): "",
         }  # fmt: skip
         assert {case: await page.value(seen % case) for case in cases} == cases
-
-
-@needs_browser
-async def test_two_visitors_see_the_table_each_from_their_own_place_and_are_called_as_the_page_calls_somebody(
-    place: Place,
-) -> None:
-    words = "['.sit', '.what'].map((each) => document.querySelector(each).textContent)"
-    names = "[...document.querySelectorAll('.heads .name b')].map((each) => each.textContent)"
-    async with opened(place) as one:
-        await sit(one)
-        async with opened(place, language="de-AT") as other:
-            await other.until(f"{SEAT}.textContent === 'Auch hinsetzen'")
-            assert (await other.value(words))[1].startswith("Jemand ist schon hier. ")
-            await other.until(f"{names}.join() === 'Gast'")
-            await press(other, ".other")
-            await other.until(f"{names}.join() === 'Visitor'")
-            assert (await other.value(words))[0] == "Sit down, too"
-            assert (await other.value(words))[1].startswith("Somebody is here already. ")
-            await sit(other)
-            for width, height in (PHONE, (1366, 768)):
-                await other.look(width, height)
-                await other.call("Emulation.setEmulatedMedia", features=CALM)
-                isStill = f"window.stage.box.width === {width} && window.stage.shown.isStill"
-                await other.until(f"{isStill} && !({HIDDEN}).length")
-        named = """import('./stage/words.js').then(({ texts }) => ["en", "de"].map((name) => texts(name, "en"))
-          .map(({ beside, others, listed }) => [["ann"], ["ann", "ben"], ["ann", "visitor"]]
-            .map((ids) => [beside(listed(ids)), others(listed(ids), ids.length)])))"""
-        assert await one.value(named) == [
-            [
-                ["Sit down beside ann", "ann is here already."],
-                ["Sit down beside ann and ben", "ann and ben are here already."],
-                ["Sit down, too", "Others are here already."],
-            ],
-            [
-                ["Neben ann setzen", "ann ist schon hier."],
-                ["Neben ann und ben setzen", "ann und ben sind schon hier."],
-                ["Auch hinsetzen", "Andere sind schon hier."],
-            ],
-        ]
-
-
-@needs_browser
-async def test_a_third_visitor_reads_each_name_and_to_whom_the_robot_speaks(place: Place) -> None:
-    rects = """[...document.querySelectorAll('.heads .name')].map((each) => each.getBoundingClientRect())
-      .map(({ left, top, right, bottom }) => [left, top, right, bottom])"""
-    hint = "document.querySelector('.hint').textContent"
-    async with await open_hub("robot", connect=(place.endpoint,)) as hub, AsyncExitStack() as company:
-        for name in ("ann", "ben"):
-            await company.enter_async_context(perceive(name, hub=hub))
-        async with opened(place) as page, connect(hub=hub, name="manager") as robot:
-            await sit(page)
-            for width, height in (PHONE, (844, 390), (1366, 768)):
-                await page.look(width, height)
-                await page.until(f"window.stage.box.width === {width} && window.stage.shown.isStill")
-                await page.until("document.querySelectorAll('.heads .name').length === 2")
-                one, other = await page.value(rects)
-                assert one[0] >= other[2] or other[0] >= one[2] or one[1] >= other[3] or other[1] >= one[3]
-            turn = {"turn_status": "full", "parts": [{"say": "Do you know what this is, and where it comes from?"}]}
-            saying = asyncio.create_task(robot.perform(turn, addressee="ben"))
-            await page.until(f"{hint} === 'The robot is speaking to ben.'", 20)
-            await saying
 
 
 @needs_browser

@@ -5,7 +5,7 @@ pieces have, and write what corrects it.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 import typer
@@ -14,7 +14,7 @@ from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.text import utf8
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity
-from engage_hri.services.commandline.shell.options import Configured
+from engage_hri.services.commandline.bodies.cameras import CameraOptions, calibrated_camera, learned_colors
 from engage_hri.services.commandline.shell.process import DONE, run, typed
 from engage_hri.services.commandline.shell.result_file import ResultFile
 from engage_hri.services.commandline.shell.settings import RobotConfig
@@ -28,39 +28,7 @@ FEWEST = 3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Configured):
-    what: Annotated[
-        Literal["body", "eyes", "pieces", "colors"],
-        typer.Argument(
-            metavar="body|eyes|pieces|colors",
-            help="The robot's body; the camera of eyes, or of pieces; or the colors of the pieces.",
-        ),
-    ]
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Where the result is written.", show_default="calibration, or WHAT.toml"),
-    ] = None
-    source: Annotated[
-        str | None,
-        typer.Option(
-            "--from", metavar="SOURCE", help="Pictures: camera, or film:PATH.", show_default="the settings'"
-        ),
-    ] = None
-    sheet: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write the sheet of markers to print, as SVG; nothing is measured."),
-    ] = None
-    at: Annotated[
-        tuple[float, float, float] | None,
-        typer.Option(
-            metavar="X Y Z", help="Where the sheet lies, its middle, or who sits there has the eyes; metres."
-        ),
-    ] = None
-    upright: Annotated[bool, typer.Option("--upright", help="The sheet stands, facing the robot.")] = False
-    seat: Annotated[bool, typer.Option("--seat", help="Somebody sits there; no sheet is needed.")] = False
-    task: Annotated[
-        str | None, typer.Option(metavar="TASK", help="Whose pieces have these colors: a task's name, or its file.")
-    ] = None
+class Options(CameraOptions):
     part: Annotated[
         list[str] | None,
         typer.Option(metavar="PART", help="head, left_arm or right_arm; may be repeated.", show_default="all it has"),
@@ -117,8 +85,6 @@ class AskedEyes:
 
 def main(options: Options) -> int:
     if options.what != "body":
-        from engage_hri.services.commandline.bodies.cameras import calibrated_camera, learned_colors
-
         made = learned_colors if options.what == "colors" else calibrated_camera
         return made(options)
     config = options.load()

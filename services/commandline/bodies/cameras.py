@@ -1,20 +1,22 @@
 """Measurements of `engage calibrate` by pictures: where a camera stands, how wide it sees, the colors of pieces."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import msgspec
+import typer
 
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Vector
+from engage_hri.services.commandline.shell.options import Configured
 from engage_hri.services.commandline.shell.process import DONE
 from engage_hri.services.commandline.shell.result_file import ResultFile
 from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.perception.attached import AttachedCamera
 
 if TYPE_CHECKING:
-    from engage_hri.services.commandline.bodies.calibrate import Options
     from engage_hri.services.perception.eyes.placing import PlacedCamera
 
 HEADS = 30
@@ -25,7 +27,43 @@ ASTRAY = 0.03
 """Metres from its place of the task's beginning from which on a piece is taken for another thing."""
 
 
-def calibrated_camera(options: "Options") -> int:
+@dataclass(frozen=True, kw_only=True)
+class CameraOptions(Configured):
+    what: Annotated[
+        Literal["body", "eyes", "pieces", "colors"],
+        typer.Argument(
+            metavar="body|eyes|pieces|colors",
+            help="The robot's body; the camera of eyes, or of pieces; or the colors of the pieces.",
+        ),
+    ]
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Where the result is written.", show_default="calibration, or WHAT.toml"),
+    ] = None
+    source: Annotated[
+        str | None,
+        typer.Option(
+            "--from", metavar="SOURCE", help="Pictures: camera, or film:PATH.", show_default="the settings'"
+        ),
+    ] = None
+    sheet: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the sheet of markers to print, as SVG; nothing is measured."),
+    ] = None
+    at: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(
+            metavar="X Y Z", help="Where the sheet lies, its middle, or who sits there has the eyes; metres."
+        ),
+    ] = None
+    upright: Annotated[bool, typer.Option("--upright", help="The sheet stands, facing the robot.")] = False
+    seat: Annotated[bool, typer.Option("--seat", help="Somebody sits there; no sheet is needed.")] = False
+    task: Annotated[
+        str | None, typer.Option(metavar="TASK", help="Whose pieces have these colors: a task's name, or its file.")
+    ] = None
+
+
+def calibrated_camera(options: CameraOptions) -> int:
     """Find where the camera of eyes, or of pieces, stands, and write it as settings."""
     if options.sheet is not None:
         from engage_hri.services.perception.eyes.placing import sheet
@@ -108,7 +146,7 @@ def _by_seat(config: RobotConfig, source: str, at: Vector) -> "tuple[PlacedCamer
     return placed_by_seat(heads, focal, at, eyes.place, width), f"{len(heads)} pictures of one face"
 
 
-def learned_colors(options: "Options") -> int:
+def learned_colors(options: CameraOptions) -> int:
     """Learn the colors of pieces that lie where their task begins, and write them.
 
     Raises RunFailed: one is not there.
