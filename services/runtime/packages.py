@@ -112,7 +112,7 @@ def install(parcel: Parcel, file: Path, into: Path) -> list[Path]:
             content = read(member)
             _check(content, digest, f"{file}: {member}")
             path = into / Path(member).name
-            part = path.with_name(f".{path.name}.part")
+            part = path.with_name(f".{path.name}.{os.getpid()}.part")
             part.write_bytes(content)
             part.replace(path)  # a service that starts meanwhile finds the whole, or nothing
             kept.append(path)

@@ -69,6 +69,7 @@ ELSEWHERE = {
     ("docs/eyes.md", "python"): "tests/perception/eyes/test_eyes_page.py",
     ("docs/pieces.md", "sh"): "tests/perception/pieces/test_pieces_page.py",
     ("docs/pieces.md", "python"): "tests/perception/pieces/test_pieces_page.py",
+    ("docs/pieces.md", "toml"): "tests/perception/pieces/test_pieces_page.py",
     ("docs/people.md", "python"): "tests/client/test_people_page.py",
     ("docs/talk.md", "python"): "tests/client/test_small_talk.py",
     ("docs/console.md", "nginx"): "tests/console/test_path.py",

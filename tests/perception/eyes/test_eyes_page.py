@@ -20,7 +20,8 @@ def shown(language: str) -> list[str]:
 
 
 def test_its_command_has_settings_that_there_are():
-    [(_, install, command)] = [block.strip().splitlines() for block in shown("sh")]
+    (_, install, command), [judged] = [block.strip().splitlines() for block in shown("sh")]
+    assert judged.startswith(".venv/bin/engage check-perception tracker.mcap ")
     words = shlex.split(command)
     assert shlex.split(install)[1:] == ["eyes", "install"]
     assert words[:2] == [".venv/bin/engage", "run"]
