@@ -227,7 +227,9 @@ async def test_a_whole_robot_asks_two_and_hears_who_answers_first(hub: MemoryHub
     if answers == "nobody":
         assert [(each.state, each.answered_by) for each in pairs] == [("failed", "")] * 2
     else:
-        assert [(each.state, each.answered_by) for each in pairs] == [("completed", answers)] * 2
+        # The answer's end comes in the same instant as the answer: the turn may close between the two.
+        assert {each.state for each in pairs} <= {"succeeded", "completed"}
+        assert [each.answered_by for each in pairs] == [answers] * 2
         assert [each.text for each in told.heard] == ["me of course"]
 
 

@@ -100,7 +100,7 @@ def test_a_connection_event_that_has_only_begun() -> None:
 
     assert line(message) == (
         '{"type":"connection_event","id":"e-1","kind":"directed_gaze","initiator":"robot","responder":"human",'
-        '"state":"started","at":3.0,"started":3.0,"objects":["cup"],"cause":"reference","optional":false,'
+        '"state":"started","at":3.0,"started":3.0,"objects":["cup"],"one_of":false,"cause":"reference","optional":false,'
         '"delay":null,"delay_error":0.0,"duration":null,"limit":null,"response":null,"answered_by":"","confidence":1.0,"block":"","behavior":"","turn":"",'
         '"words":"","retold":false}'
     )
@@ -121,6 +121,7 @@ def test_statistics_of_all() -> None:
         "type": "statistics", "actor": "", "at": 3.0, "engagement": 0.5, "level": "engaged", "reasons": [],
         "busy": False, "busy_until": None, "level_since": None,
         "contact": {"now": None, "share": 0.0, "ended": None},
+        "head": None,
         "session": {
             "events": 2, "mtbce": 5.7, "mtbce_without_maintenance": None, "max_gap": None, "last_start": 2.5,
             "last_start_without_maintenance": None,

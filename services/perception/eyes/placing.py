@@ -34,6 +34,8 @@ HELD, LAID = 8, 10
 """Pictures of each kind that are enough."""
 OPEN: Degrees = 1.0
 """Standard deviation of the field of view from which on it is not known."""
+BEGINNINGS = 0.6, 1.0, 1.7
+"""Focal lengths from which the search begins, in widths of the picture: fields of view from 80 to 33 degrees."""
 LEAST = 4
 """Markers that have to be seen for a picture to count."""
 FLAT = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
@@ -156,15 +158,19 @@ def _moved(one: SeenSheet, other: SeenSheet) -> float:
     return float(np.linalg.norm(both, axis=1).max()) if both else math.inf
 
 
-def placed_by_sheet(
-    moved: Sequence[SeenSheet], laid: Sequence[SeenSheet], axes: Floats, at: Vector, width: int, height: int
-) -> PlacedCamera:
-    """Find a camera by its pictures of the sheet. moved: held anywhere; laid: at its place, with these axes.
+class _Calibrated(NamedTuple):
+    """Focal length in pixels, with its deviation; turns and shifts of the sheet in each picture; pixels it is off."""
 
-    Raises RunFailed: they leave open how wide it sees.
-    """
-    views = [*moved, *laid]
-    start = np.array([[width, 0, width / 2], [0, width, height / 2], [0, 0, 1]], float)
+    focal: float
+    spread: float
+    turns: Sequence[Floats]
+    shifts: Sequence[Floats]
+    beside: float
+
+
+def _calibrated(views: Sequence[SeenSheet], width: int, height: int, begin: float) -> _Calibrated:
+    """Fit a camera to pictures of the sheet. begin: the focal length from which the search begins, in pixels."""
+    start = np.array([[begin, 0, width / 2], [0, begin, height / 2], [0, 0, 1]], float)
     flags = (
         cv2.CALIB_USE_INTRINSIC_GUESS | cv2.CALIB_FIX_PRINCIPAL_POINT | cv2.CALIB_FIX_ASPECT_RATIO
         | cv2.CALIB_ZERO_TANGENT_DIST | cv2.CALIB_FIX_K1 | cv2.CALIB_FIX_K2 | cv2.CALIB_FIX_K3
@@ -173,9 +179,23 @@ def placed_by_sheet(
         [view.places.astype(np.float32) for view in views], [view.pixels.astype(np.float32) for view in views],
         (width, height), start, np.zeros(5), flags=flags,
     )  # fmt: skip
-    focal, spread = float(matrix[0, 0]), float(spreads.ravel()[:2].max())  # one of the two is held to the other
+    spread = float(spreads.ravel()[:2].max())  # one of the two is held to the other
+    return _Calibrated(float(matrix[0, 0]), spread, turns, shifts, float(beside))
+
+
+def placed_by_sheet(
+    moved: Sequence[SeenSheet], laid: Sequence[SeenSheet], axes: Floats, at: Vector, width: int, height: int
+) -> PlacedCamera:
+    """Find a camera by its pictures of the sheet. moved: held anywhere; laid: at its place, with these axes.
+
+    Raises RunFailed: they leave open how wide it sees.
+    """
+    # Where pictures leave the focal length open, each beginning of the search ends elsewhere, and each is sure of it.
+    found = [_calibrated([*moved, *laid], width, height, begin * width) for begin in BEGINNINGS]
+    fields = [_field(each.focal, width) if each.focal > 0 else math.inf for each in found]
+    focal, spread, turns, shifts, beside = found[1]
     error = _field(focal, width) - _field(focal + spread, width) if focal > 0 and spread > 0 else math.inf
-    if error > OPEN:
+    if error > OPEN or not max(fields) - min(fields) <= OPEN:
         advice = "before it is laid down hold it at a slant, to all sides, nearer and farther"
         raise RunFailed(Fault(reason="these pictures leave open how wide the camera sees", advice=advice))
     placed, directions = [], []
@@ -184,7 +204,7 @@ def placed_by_sheet(
         placed.append(axes @ (-rotation.T @ shift.ravel()) + at)
         directions.append(axes @ rotation.T)
     u, _, v = np.linalg.svd(np.mean(directions, 0))
-    return _stated(np.mean(placed, 0), u @ v, _field(focal, width), error, float(beside))
+    return _stated(np.mean(placed, 0), u @ v, _field(focal, width), error, beside)
 
 
 def placed_by_seat(
