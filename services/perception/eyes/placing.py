@@ -163,8 +163,8 @@ class _Calibrated(NamedTuple):
 
     focal: float
     spread: float
-    turns: Sequence[Floats]
-    shifts: Sequence[Floats]
+    turns: Sequence[Any]
+    shifts: Sequence[Any]
     beside: float
 
 
