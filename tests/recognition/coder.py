@@ -80,7 +80,7 @@ class Coder:
         acts: list[Span | Turn | Absence] = [*signs, *self._timeline.turns, *self._gone]
         for act in self._in_order(acts):
             for side in self._sides.values():
-                self._expire(side, _known(act)[0])
+                self._expire(side, _noticed(act))
             if isinstance(act, Turn):
                 self._robot_speaks(act)
                 for side in self._sides.values():
@@ -375,8 +375,10 @@ class Coder:
         return LONGEST_SOUND_TOLD if self._timeline.tells else LONGEST_SOUND
 
     def _is_noise(self, sign: Span) -> bool:
-        """True for a sound of which no words come where they would have come: a cough, or a laugh."""
-        is_wordless = sign.known is None and self._timeline.is_worded and id(sign) not in self._used
+        """True for a cough, or a laugh: no words come where they would have come, or too late to say anything."""
+        is_late = sign.known is not None and sign.known[0] > sign.until[0] + WORDS_AFTER + ROUND
+        is_unheard = sign.known is None or (is_late and not self._is_last(sign))
+        is_wordless = is_unheard and self._timeline.is_worded and id(sign) not in self._used
         return sign.action == "speak" and is_wordless and sign.seconds <= self._longest_sound + ROUND
 
     def _takes_turn(self, side: Side, sign: Span) -> None:
@@ -439,6 +441,11 @@ def _speaks_to_robot(each: Span, person: str) -> bool:
 def _known(act: Span | Turn | Absence) -> Instant:
     """When it is taken into account: a face that is back soon had not gone."""
     return (act.since[0] + FACE_GRACE, LAST) if isinstance(act, Absence) else act.since
+
+
+def _noticed(act: Span | Turn | Absence) -> float:
+    """When it is known that anything has happened: a limit that has passed by then stays passed."""
+    return act.known[0] if isinstance(act, Span) and act.is_alone and act.known else _known(act)[0]
 
 
 def as_told(events: Sequence[ConnectionEvent]) -> list[Coded]:

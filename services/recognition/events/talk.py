@@ -275,8 +275,8 @@ class Talk(KindRecognizer):
                 self.take_early(speech.since, lambda talk: talk.speaks(speech.part, beside=speech.is_beside))
             elif speech.is_into_turn or speech.is_beside:
                 speech.part.taken_for = "noise"  # as such it is judged by its words
-            else:
-                self.take_early(speech.since, lambda talk: talk.has_said(speech.part))
+            elif self._scene.is_last(self.id, speech.since):  # what either has said since may wait in line
+                self.take_early(speech.since, lambda talk: talk.exchange.take(speech.part))
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         """Take the person's leaving: nothing waits any longer."""
