@@ -50,6 +50,7 @@ Step = Callable[[Conversation], object]
 class CutOff(NamedTuple):
     """The robot's turn was cut off: its pair ends, unless somebody has answered it before."""
 
+    turn: str
     step: Step
 
 
@@ -408,9 +409,9 @@ class Talk(KindRecognizer):
 
     def abort(self, at: Seconds, *, turn: str) -> None:
         # Who has interrupted the turn has done so before that, also if it is known only now, and told of `at`.
-        cut_off = CutOff(lambda talk: talk.abort(at, turn=turn))
-        if self._line or (self.asked_since < inf and self._scene.is_contested(self.id, at)):
-            self._line.append((nextafter(at, inf), cut_off))
+        cut_off, since = CutOff(turn, lambda talk: talk.abort(at, turn=turn)), nextafter(at, inf)
+        if self._line or (self.asked_since < inf and self._scene.is_contested(self.id, since)):
+            self._line.append((since, cut_off))
         else:
             cut_off.step(self._conversation)
 
@@ -431,9 +432,12 @@ class Talk(KindRecognizer):
     @property
     def _is_behind_others(self) -> bool:
         """True if the first in line waits until it is known whether somebody else has answered before."""
-        since = self.undecided_since
-        if since is None or isinstance(self._line[0][1], CutOff):
-            return since is not None and self._scene.is_contested(self.id, since)
+        since, first = self.undecided_since, self._line[0][1]
+        if since is None:
+            return False
+        if isinstance(first, CutOff):
+            is_answered = any(event.turn == first.turn for event, _ in self._writer.answered)
+            return is_answered or self._scene.is_contested(self.id, since)
         return self._waits_for_others(since)
 
     @property
