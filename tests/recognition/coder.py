@@ -336,9 +336,13 @@ class Coder:
             yield found
 
     def _is_decided(self, answer: Span, turn: Turn) -> bool:
-        """True if it is known before the end of the robot's words that somebody has interrupted them."""
+        """True if it is known before the end of the robot's words that somebody has interrupted them.
+
+        In company also with words that come later: it has waited for them, and what is known late has happened early.
+        """
         decided = min(answer.until[0], answer.since[0] + (WORDS_WAIT if self._timeline.is_worded else BRIEF))
-        return answer.action == "speak" and decided < turn.until[0] - ROUND
+        is_told_late = len(self._sides) > 1 and self._is_heard(answer) and answer.words not in LISTENING
+        return answer.action == "speak" and (decided < turn.until[0] - ROUND or is_told_late)
 
     def _interrupts(self, speech: Span, turn: Turn, *, is_noise: bool = False) -> bool:
         """True if a speech that is over within the robot's turn takes the floor.

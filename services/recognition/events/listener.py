@@ -54,6 +54,7 @@ class Listener:
         """Take a part of the sign that goes on, or of a new one. beside: the robot speaks to others."""
         self.next_begins()
         self._joins(part, beside=beside)
+        self.judge(part.since)  # what is told late may have its words
 
     def next_begins(self) -> None:
         """Decide the sign if it is over: its words have not come until the next one begins."""
