@@ -250,9 +250,7 @@ class Coder:
                 sign = [each for each in sign if self._is_shown_to_robot(side, each)]
                 heard = max(speech.since[0] + WORDS_WAIT, speech.until[0] + WORDS_AFTER)
                 is_in_time = speech.known is not None and speech.known[0] <= heard + ROUND
-                # Until it is known to whom it is, its words are waited for, also if the next sound has begun.
-                is_waited_for = is_in_time and (self._timeline.tells != "early" or self._is_last(speech))
-                is_known = is_waited_for or (self._is_last(speech) and not any(map(self._shows, sign)))
+                is_known = is_in_time or (self._is_last(speech) and not any(map(self._shows, sign)))
                 is_noise = self._timeline.is_worded and not is_known
                 shown = sorted(each.since for each in sign if self._shows(each))
                 shown = shown if is_noise else [speech.since]
