@@ -38,7 +38,7 @@ from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.kinds import KindRecognizer
 from engage_hri.services.recognition.events.limits import ROUNDING, LimitClock
 from engage_hri.services.recognition.events.listener_sign import WORDS_WAIT, SignPart
-from engage_hri.services.recognition.events.machine import EventWriter, OngoingEvent
+from engage_hri.services.recognition.events.machine import Answered, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import Question, SessionScene
 from engage_hri.services.text.listening import is_listening, says_words
 
@@ -50,7 +50,6 @@ Step = Callable[[Conversation], object]
 class CutOff(NamedTuple):
     """The robot's turn was cut off: its pair ends, unless somebody has answered it before."""
 
-    turn: str
     step: Step
 
 
@@ -92,12 +91,16 @@ class Talk(KindRecognizer):
         pair = self._conversation.exchange.pair
         return pair.event.started if pair.event is not None and pair.may_be_answered else self._asked_in_line
 
-    @property
-    def has_answered_since(self) -> Seconds:
-        """Start of what answers the robot's turn, or may; infinite: nothing does."""
+    def may_answer_before(self, answered: Answered) -> bool:
+        """True if the person has answered the same turn of the robot, too, or may have, and has begun before."""
         pair, sign = self._conversation.pair, self._conversation.listener.sign
-        since = [each.since for each in sign.speeches] if sign is not None else []
-        return min([*since, pair.interrupted_since, *(at for at, _ in islice(self._line, 1))])
+        is_asked = pair.is_turn(answered.event.turn)
+        since = [at for at, _ in islice(self._line, 1)]
+        if is_asked:
+            since.append(pair.interrupted_since)
+        if sign is not None and (sign.is_beside or is_asked):
+            since += [each.since for each in sign.speeches]
+        return min(since, default=inf) < answered.began - ROUNDING
 
     @property
     def is_under_way(self) -> bool:
@@ -409,7 +412,7 @@ class Talk(KindRecognizer):
 
     def abort(self, at: Seconds, *, turn: str) -> None:
         # Who has interrupted the turn has done so before that, also if it is known only now, and told of `at`.
-        cut_off, since = CutOff(turn, lambda talk: talk.abort(at, turn=turn)), nextafter(at, inf)
+        cut_off, since = CutOff(lambda talk: talk.abort(at, turn=turn)), nextafter(at, inf)
         if self._line or (self.asked_since < inf and self._scene.is_contested(self.id, since)):
             self._line.append((since, cut_off))
         else:
@@ -432,12 +435,11 @@ class Talk(KindRecognizer):
     @property
     def _is_behind_others(self) -> bool:
         """True if the first in line waits until it is known whether somebody else has answered before."""
-        since, first = self.undecided_since, self._line[0][1]
-        if since is None:
-            return False
-        if isinstance(first, CutOff):
-            is_answered = any(event.turn == first.turn for event, _ in self._writer.answered)
-            return is_answered or self._scene.is_contested(self.id, since)
+        since, (at, first) = self.undecided_since, self._line[0]
+        if any(each.began <= at and not self.may_answer_before(each) for each in self._writer.answered):
+            return True  # it is to be told first that this has answered for all
+        if since is None or isinstance(first, CutOff):
+            return since is not None and self._scene.is_contested(self.id, since)
         return self._waits_for_others(since)
 
     @property
