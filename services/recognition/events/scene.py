@@ -263,11 +263,11 @@ class SessionScene:
         """True if a look at `target` is one at the face of a person or of the robot."""
         return target == self.robot or target in self.present
 
-    def note_spoken(self, spoken: Spoken) -> None:
-        """Remember a speech whose addressees are known now."""
+    def note_spoken(self, spoken: Spoken, at: Seconds) -> None:
+        """Remember a speech whose addressees are known at `at`."""
         self.floor_changes += 1
-        if not spoken.is_noted:
-            spoken.is_noted = True
+        if spoken.noted_at == inf:
+            spoken.noted_at = at
             self.spoken.append(spoken)
 
     def spoken_since(self, actor: str, since: Seconds) -> Spoken | None:

@@ -36,7 +36,7 @@ from engage_hri.services.recognition.events.addressing import (
 from engage_hri.services.recognition.events.conversation import Conversation
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.kinds import KindRecognizer
-from engage_hri.services.recognition.events.limits import ROUNDING, LimitClock
+from engage_hri.services.recognition.events.limits import ROUNDING, LimitClock, in_time
 from engage_hri.services.recognition.events.listener_sign import WORDS_WAIT, SignPart
 from engage_hri.services.recognition.events.machine import Answered, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import Question, SessionScene
@@ -483,7 +483,7 @@ class Talk(KindRecognizer):
             self._writer.decide_interjection(self.id, speech.since, "other", at)
         elif speech.until is None:
             self._may_interrupt(speech, "", at)
-        self._scene.note_spoken(speech)
+        self._scene.note_spoken(speech, at)
 
     def _queue(self, at: Seconds, speech: OwnSpeech) -> None:
         is_next = speech.is_to(self._scene.robot) and self._waits_for_others(at)
@@ -502,7 +502,8 @@ class Talk(KindRecognizer):
             self._is_known_speech(speech, is_known=not is_sign)
 
     def _decide(self, speech: OwnSpeech, at: Seconds) -> None:
-        """Decide what the sound is, by what is known: nothing, if it is over and has no words; else to whom it is."""
+        """Decide what the sound is, by what was known when it was due: nothing, or to whom it is."""
+        at = min(at, self._decided_at(speech))  # it may have waited in line since
         to = self._likely(speech, at) if speech.to is None else speech.to
         is_judged_here = not self._is_into_words(speech) or self._scene.robot not in to
         is_noise = is_judged_here and speech.may_be_noise and speech.until is not None
@@ -518,11 +519,12 @@ class Talk(KindRecognizer):
         """Addressees of a speech by what is likely."""
         if speech.until is None:
             speech.faces.turns(speech.faces.face, at)
-        waits = self._conversation.exchange.pair.may_be_answered_with("speak")
+        pair = self._conversation.exchange.pair
+        waits = pair.may_be_answered_with("speak") and in_time(speech.since, pair.deadline)
         awaited_by = frozenset((self._scene.robot,)) if waits else NOBODY
         is_untold = self._scene.tells_addressees and not says_words(speech.words)
         within = self._config.adjacency_pair_limit
-        return likely(speech, self._scene.spoken, within=within, awaited_by=awaited_by, is_untold=is_untold)
+        return likely(speech, self._scene.spoken, by=at, within=within, awaited_by=awaited_by, is_untold=is_untold)
 
     def may_go_on(self, now: Seconds) -> bool:
         """True if it is decided by `now` to whom the first speech in line is, or if what is decided may be told."""
@@ -538,6 +540,7 @@ class Talk(KindRecognizer):
             self._catch_up(at)
             if isinstance(item, OwnSpeech):
                 self._conversation.listener.next_begins()
+                self._catch_up(at)  # the sign may have held the pair
             if (speech := self._undecided_first) is not None:
                 if self._decided_at(speech) > now:
                     break
