@@ -299,8 +299,8 @@ class SessionScene:
         known = [
             each for each in self.spoken if each.named and not (each.is_open or each.may_be_noise or each.is_noise)
         ]
-        over = [(each.until, each.since, each) for each in known if each.until is not None]
-        return [each for _, _, each in sorted(over, key=lambda one: one[:2])[-ENDED_TOLD:]]
+        over = [(each.until, each.since, each.actor, each) for each in known if each.until is not None]
+        return [one[-1] for one in sorted(over, key=lambda one: one[:-1])[-ENDED_TOLD:]]
 
     @property
     def robot_speaks_since(self) -> Seconds | None:
