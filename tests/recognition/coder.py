@@ -80,7 +80,7 @@ class Coder:
         acts: list[Span | Turn | Absence] = [*signs, *self._timeline.turns, *self._gone]
         for act in self._in_order(acts):
             for side in self._sides.values():
-                self._expire(side, _noticed(act))
+                self._expire(side, _known(act)[0])
             if isinstance(act, Turn):
                 self._robot_speaks(act)
                 for side in self._sides.values():
@@ -441,13 +441,10 @@ def _speaks_to_robot(each: Span, person: str) -> bool:
 
 
 def _known(act: Span | Turn | Absence) -> Instant:
-    """When it is taken into account: a face that is back soon had not gone."""
-    return (act.since[0] + FACE_GRACE, LAST) if isinstance(act, Absence) else act.since
-
-
-def _noticed(act: Span | Turn | Absence) -> float:
-    """When it is known that anything has happened: a limit that has passed by then stays passed."""
-    return act.known[0] if isinstance(act, Span) and act.is_alone and act.known else _known(act)[0]
+    """When it is taken into account: a face that is back soon had not gone, and words may alone tell of a speech."""
+    if isinstance(act, Absence):
+        return act.since[0] + FACE_GRACE, LAST
+    return act.known if isinstance(act, Span) and act.is_alone and act.known else act.since
 
 
 def as_told(events: Sequence[ConnectionEvent]) -> list[Coded]:
