@@ -181,7 +181,7 @@ def test_who_points_teaches_and_it_stays_with_the_person_who_is_joined() -> None
     assert len(habit.looks) == 2
     assert habit.offset[1] < 0
     assert recognizer.heads() == {}
-    recognizer.join(HUMAN, "ann", 5.0)
+    recognizer.join(HUMAN, "ann", 5.0, speaks=False)
     assert recognizer.heads()["ann"].looks == habit.looks
 
 
