@@ -9,7 +9,7 @@ from math import inf
 from msgspec.structs import replace
 
 from tests.recognition.coder import BRIEF, FACE_GRACE, ROUND, WORDS_WAIT
-from tests.recognition.floor_coder import is_noise
+from tests.recognition.floor_coder import is_noise, longest_sound
 from tests.recognition.observations import ROBOT
 from tests.recognition.timeline import CALLED, LIMIT, Span, Timeline
 
@@ -98,7 +98,7 @@ def _company(speech: Span, before: Timeline) -> list[str]:
     at = speech.since[0]
     gone = {
         each.who for each in before.away
-        if each.until[0] - each.since[0] >= FACE_GRACE and each.since[0] + FACE_GRACE <= at < each.until[0]
+        if each.until[0] - each.since[0] >= FACE_GRACE and each.since[0] + FACE_GRACE + ROUND < at < each.until[0]
     }  # fmt: skip
     return [each for each in before.people if each != speech.who and each not in gone]
 
@@ -122,7 +122,8 @@ def _answered(speech: Span, before: Timeline) -> str:
             heard += [(until[0], since[0], ROBOT, "") for since, until in turn.speech]
     for each in before.spans:
         if each.action == "speak" and not is_noise(each, before) and speech.who in (each.who, each.to):
-            if each.who != speech.who and each.until > decided and before.tells != "early":
+            known = min(each.until, (each.since[0] + longest_sound(before), 0))
+            if each.who != speech.who and known > decided and before.tells != "early":
                 continue  # nobody knows yet to whom it is
             heard.append((each.until[0], each.since[0], each.who, each.to))
     recent = [
@@ -133,4 +134,4 @@ def _answered(speech: Span, before: Timeline) -> str:
     _, _, who, to = max(recent)
     if who != speech.who:
         return who
-    return to
+    return "" if before.tells and speech.known is None else to  # words would have come with their addressees

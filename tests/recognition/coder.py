@@ -250,9 +250,7 @@ class Coder:
                 sign = [each for each in sign if self._is_shown_to_robot(side, each)]
                 heard = max(speech.since[0] + WORDS_WAIT, speech.until[0] + WORDS_AFTER)
                 is_in_time = speech.known is not None and speech.known[0] <= heard + ROUND
-                # Until it is known to whom it is, its words are waited for, also if the next sound has begun.
-                is_waited_for = is_in_time and (self._timeline.tells != "early" or self._is_last(speech))
-                is_known = is_waited_for or (self._is_last(speech) and not any(map(self._shows, sign)))
+                is_known = is_in_time or (self._is_last(speech) and not any(map(self._shows, sign)))
                 is_noise = self._timeline.is_worded and not is_known
                 shown = sorted(each.since for each in sign if self._shows(each))
                 shown = shown if is_noise else [speech.since]
@@ -336,9 +334,13 @@ class Coder:
             yield found
 
     def _is_decided(self, answer: Span, turn: Turn) -> bool:
-        """True if it is known before the end of the robot's words that somebody has interrupted them."""
+        """True if it is known before the end of the robot's words that somebody has interrupted them.
+
+        In company also with words that come later: it has waited for them, and what is known late has happened early.
+        """
         decided = min(answer.until[0], answer.since[0] + (WORDS_WAIT if self._timeline.is_worded else BRIEF))
-        return answer.action == "speak" and decided < turn.until[0] - ROUND
+        is_told_late = len(self._sides) > 1 and self._is_heard(answer) and answer.words not in LISTENING
+        return answer.action == "speak" and (decided < turn.until[0] - ROUND or is_told_late)
 
     def _interrupts(self, speech: Span, turn: Turn, *, is_noise: bool = False) -> bool:
         """True if a speech that is over within the robot's turn takes the floor.
@@ -375,8 +377,10 @@ class Coder:
         return LONGEST_SOUND_TOLD if self._timeline.tells else LONGEST_SOUND
 
     def _is_noise(self, sign: Span) -> bool:
-        """True for a sound of which no words come where they would have come: a cough, or a laugh."""
-        is_wordless = sign.known is None and self._timeline.is_worded and id(sign) not in self._used
+        """True for a cough, or a laugh: no words come where they would have come, or too late to say anything."""
+        is_late = sign.known is not None and sign.known[0] > sign.until[0] + WORDS_AFTER + ROUND
+        is_unheard = sign.known is None or (is_late and not self._is_last(sign))
+        is_wordless = is_unheard and self._timeline.is_worded and id(sign) not in self._used
         return sign.action == "speak" and is_wordless and sign.seconds <= self._longest_sound + ROUND
 
     def _takes_turn(self, side: Side, sign: Span) -> None:
@@ -437,8 +441,10 @@ def _speaks_to_robot(each: Span, person: str) -> bool:
 
 
 def _known(act: Span | Turn | Absence) -> Instant:
-    """When it is taken into account: a face that is back soon had not gone."""
-    return (act.since[0] + FACE_GRACE, LAST) if isinstance(act, Absence) else act.since
+    """When it is taken into account: a face that is back soon had not gone, and words may alone tell of a speech."""
+    if isinstance(act, Absence):
+        return act.since[0] + FACE_GRACE, LAST
+    return act.known if isinstance(act, Span) and act.is_alone and act.known else act.since
 
 
 def as_told(events: Sequence[ConnectionEvent]) -> list[Coded]:

@@ -77,7 +77,8 @@ def is_noise(one: Span, timeline: Timeline) -> bool:
             if one.to == ROBOT and since < one.since < until:
                 if until < one.until:
                     return False
-                longest, wait = WORDS_WAIT, max(wait, until[0])
+                longest = WORDS_WAIT if one.who in turn.to else longest
+                wait = max(wait, until[0])
     if one.known is None or (one.known[0] > wait and has_spoken_since(one, timeline)):
         return one.seconds <= longest + 1e-6
     return False
@@ -110,7 +111,7 @@ def _speaking(timeline: Timeline, floors: list[Floor]) -> Iterator[str]:
     ]
     changes = sorted({at for _, since, until in spoken for at in (since, until)})
     for before, at in zip(changes, [*changes[1:], inf], strict=True):
-        if at - before < SETTLED:
+        if at - before < SETTLED + 1e-6:
             continue
         speak = [who for since, who, until in sorted((since, who, until) for who, since, until in spoken)
                  if since <= before + SETTLED < until]  # fmt: skip

@@ -1,6 +1,7 @@
 """Recognition as its subscribers hear it: messages of perception and of the robot in, what is published out."""
 
 from collections.abc import Iterator
+from math import inf
 from typing import TypeVar
 
 from msgspec.structs import replace
@@ -42,17 +43,19 @@ class HeardLog:
         self.joined: dict[str, int] = {}
         """Number of messages that had been published when an id was joined with the person's own, by this id."""
         self._numbers: dict[tuple[str, float], str] = {}
+        self._now = -inf
 
     def until(self, end: float) -> None:
         """Let all happen that is due before `end`."""
         while (due := self._intake.deadline) is not None and due < end:
-            self._note(self._intake.advance(due))
+            self._now = max(self._now, due)  # what has waited may have been due before
+            self._note(self._intake.advance(self._now))
 
     def take(self, message: Message, at: float) -> None:
         """Take a message that arrives at `at`."""
         actor = getattr(message, "actor", ROBOT)
         key = KEYS.get(type(message)) or (keys.ROBOT_ACTION if actor == ROBOT else keys.PERCEIVED_ACTION)
-        source = "body" if actor == ROBOT else "camera"
+        source, self._now = "body" if actor == ROBOT else "camera", at
         self._note(self._intake.take(Input(key, message, source, at), at))
 
     def _note(self, outputs: list[Output]) -> None:

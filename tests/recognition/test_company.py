@@ -322,6 +322,33 @@ words that end just before the robot's, and are known after these, answer
     robot: started 1, failed 6
     robot: started 4, failed 9
 
+... also if what the robot has asked them waits until it is known whether somebody else has answered
+    0 ann said 0; 3 ann looks robot; 3.5 ann speaks 0.3; 4 bob speaks 2; 4.5 robot asks ann 1; 5 ann said 3.5; 30 end
+    robot: started 4.5, failed 9.5
+
+who has interrupted a turn that is cut off has answered for all, also if they begin anew when it is
+    0 ann said 0; 3 ann speaks 0.4; 3.5 ann said 3; 4 ann speaks 1; 1 robot asks ann,bob 3 cut=1; 30 end
+    robot: started 1, succeeded 4 after -1 by ann, completed 4 by ann
+    robot: started 1, succeeded 4 after -1 by ann, completed 4 by ann
+
+... also if it is not known yet to whom another speaks who began before
+    0 cy said 0; 3 bob speaks 3; 4 ann speaks 1; 1 robot asks ann,bob 3 cut=1; 5 ann said 4; 6 bob said 3 to=cy; 9 end
+    robot: started 1, succeeded 4 after 0 by ann, completed 5 by ann
+    robot: started 1, succeeded 4 after 0 by ann, completed 4 by ann
+
+who has answered has answered for all, also while another who was asked interrupts the next turn
+    1 robot asks ann,bob,cy 1; 3 robot asks ann 6; 3 ann looks robot; 4 ann speaks 2; 4.5 bob speaks 1; 9 end
+    robot: started 1, superseded 3
+    robot: started 1, succeeded 4.5 after 2.5 by bob, completed 5.5 by bob
+    robot: started 1, succeeded 4.5 after 2.5 by bob, completed 4.5 by bob
+    robot: started 3, succeeded 9 after -5, completed 9
+
+... before their own next words count, if it was not known until then to whom another speaks
+    1 robot asks ann,bob 2; 3 bob looks ann; 3.2 bob speaks 2.5; 3.5 ann speaks 0.5; 4.5 ann speaks 1; 9 end
+    robot: started 1, succeeded 3.5 after 0.5 by ann, completed 4 by ann
+    robot: started 1, succeeded 3.5 after 0.5 by ann, completed 3.5 by ann
+    ann: started 4.5, failed 9.5
+
 noise in the robot's turn is the answer if its words come after the turn
     0 ann said 0; 1 robot asks ann 3; 1 ann looks robot; 3 ann speaks 0.4; 6 ann said 3 words=wait; 30 end
     robot: started 1, succeeded 4 after -1, completed 4

@@ -72,8 +72,8 @@ class Spoken(Struct, kw_only=True):
     """True as long as words of it would tell that it is no cough."""
     is_open: bool = False
     """True as long as it is not decided what it is that somebody says into the robot's words."""
-    is_noted: bool = False
-    """True once it counts for what others say after it."""
+    noted_at: Seconds = inf
+    """Time from which on it counts for what others say; infinite: it does not yet."""
 
     @property
     def named(self) -> Addressees:
@@ -105,14 +105,14 @@ class FaceTimes(Struct):
 
     def most(self, since: Seconds) -> str:
         """The face that was looked at for more than half of the time from `since` to `at`; "": none."""
-        half = (self.at - since) / 2
+        half = (self.at - since) / 2 + ROUNDING
         return next((face for face, lasted in self.looked.items() if lasted > half), "")
 
     def most_from(self, face: str, since: Seconds) -> Seconds:
         """Time from which on this face is the one, if the look stays; infinite: it is not looked at now."""
         if self.face != face:
             return inf
-        return 2 * (self.at - self.looked.get(face, 0.0)) - since + ROUNDING
+        return 2 * (self.at - self.looked.get(face, 0.0) + 2 * ROUNDING) - since  # `most` says so by then
 
 
 class OwnSpeech(Spoken, kw_only=True):
@@ -181,12 +181,19 @@ def certain(speech: OwnSpeech, robot: str, names: Mapping[str, str], *, is_line:
 
 
 def likely(
-    speech: OwnSpeech, spoken: Iterable[Spoken], *, within: Seconds, awaited_by: Addressees, is_untold: bool
+    speech: OwnSpeech,
+    spoken: Iterable[Spoken],
+    *,
+    by: Seconds,
+    within: Seconds,
+    awaited_by: Addressees,
+    is_untold: bool,
 ) -> Addressees:
     """Addressees by rules 4 to 6, once the speech is over, or so far.
 
-    spoken: what was said before, by all. within: time after somebody's words in which the other's are about them, as
-    long as people take to answer. awaited_by: who has asked the speaker, and still waits for the answer.
+    spoken: what was said before, by all. by: when it is decided: what is known later does not count. within: time
+    after somebody's words in which the other's are about them, as long as people take to answer. awaited_by: who has
+    asked the speaker, and still waits for the answer.
     is_untold: perception will say with the words to whom it is, and has not yet.
     """
     if face := speech.faces.most(speech.since):
@@ -194,7 +201,8 @@ def likely(
     actor, at = speech.actor, speech.since
     # Those that it comes during, or at most `within` after: few of all.
     recent = [each for each in spoken if each.since < at and (each.until is None or at <= each.until + within)]
-    heard = [each for each in recent if (each.actor == actor or each.is_to(actor)) and not each.is_noise]
+    known = [each for each in recent if each.noted_at <= by]
+    heard = [each for each in known if (each.actor == actor or each.is_to(actor)) and not each.is_noise]
     # Who still goes on is the last, however that may end.
     last = max(heard, key=lambda each: (at if each.until is None else min(each.until, at), each.since), default=None)
     if last is None:

@@ -127,11 +127,6 @@ class Conversation:
                 self.pair.robot_begins("speak", self.robot_speaks_since)  # what the robot says now is the answer
         self._turned_at = at
 
-    def has_said(self, speech: SignPart) -> None:
-        """Take speech that is over, known only now. It says nothing any more if either has spoken since."""
-        if self._is_last(speech.since):
-            self.exchange.take(speech)
-
     def falls_silent(self, at: Seconds) -> None:
         if self._speech is None:
             return

@@ -54,6 +54,7 @@ class Listener:
         """Take a part of the sign that goes on, or of a new one. beside: the robot speaks to others."""
         self.next_begins()
         self._joins(part, beside=beside)
+        self.judge(part.since)  # what is told late may have its words
 
     def next_begins(self) -> None:
         """Decide the sign if it is over: its words have not come until the next one begins."""
@@ -165,7 +166,8 @@ class Listener:
         listens = self._is_listening(speech)
         is_new = speech.taken_for == "noise" and (in_turn or is_last)
         if listens is False and (is_new or (in_turn and speech.taken_for == "backchannel")):
-            self._is_turn(speech, "interruption" if in_turn else "answer", at)
+            is_over = (self._scene.robot_speaks_since or inf) > speech.since  # the words into which it was said
+            self._is_turn(speech, "answer" if is_over and not in_turn else "interruption", at)
         elif listens and speech.taken_for == "backchannel" and in_turn:
             self._tell(speech, at)  # it is that of the nod beside it, which has been told
         elif listens and (is_new or self._exchange.pair.was_listening(speech.since)):

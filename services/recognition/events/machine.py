@@ -123,6 +123,18 @@ class OngoingEvent(Struct, kw_only=True):
         self.confidence = min(self.confidence, confidence)
 
 
+class Answered(NamedTuple):
+    """A question to several people that is answered. at: when that was decided."""
+
+    event: OngoingEvent
+    at: Seconds
+
+    @property
+    def began(self) -> Seconds:
+        """Time when the answer began: into the turn, or as it was decided."""
+        return self.at + min(0.0, self.event.delay or 0.0)
+
+
 class EventWriter:
     """Writer of messages: numbers the events and turns their changes into `effects`.
 
@@ -146,8 +158,8 @@ class EventWriter:
         """What people have said into the robot's turns, as it was last told."""
         self._spoken: Latest[str, tuple[OngoingEvent, ConnectionEvent]] = Latest(TEXTS_KEPT)
         """Events with speech of a person, each as it was last told."""
-        self.answered: list[tuple[OngoingEvent, Seconds]] = []
-        """Questions to several people that have just been answered by one of them, or by somebody else, and when."""
+        self.answered: list[Answered] = []
+        """Questions to several people that one of them, or somebody else, has answered: to be told to the rest."""
 
     def take(self) -> list[Effect]:
         """Return the effects since the last call."""
@@ -172,7 +184,7 @@ class EventWriter:
         if event.is_to_several and event.response is not None and not begins:
             event.answered_by = event.answered_by or event.responder
             if state in ("succeeded", "preempted"):
-                self.answered.append((event, at))
+                self.answered.append(Answered(event, at))
         knows_delay = not begins and (state == "failed" or not event.is_former)
         told = ConnectionEvent(
                 id=event.id, kind=event.kind, initiator=event.initiator, responder=event.responder, state=state,

@@ -12,7 +12,6 @@ from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import FORGOTTEN_AFTER, Deadlines
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.limits import ROUNDING
 from engage_hri.services.recognition.events.machine import EventWriter, Mishap, OngoingEvent, PersonForgotten
 from engage_hri.services.recognition.events.person import PersonRecognition
 from engage_hri.services.recognition.events.scene import SessionScene, TakenUp
@@ -204,12 +203,11 @@ class People:
                 self._apply(self.persons[taken_up.asked], at, partial(_answered_by_other, taken_up))
         while answered := self._writer.answered:
             # The end of a turn decides several answers in one instant: the first is that of who was silent.
-            first = min(range(len(answered)), key=lambda n: answered[n][0].delay or 0.0)
-            event, at_end = answered[first]
-            since = at_end + min(0.0, event.delay or 0.0) - ROUNDING
-            if any(person.talk.has_answered_since < since for person in self.persons.values()):
-                return  # somebody who began before has answered, too, or may have
+            first = min(range(len(answered)), key=lambda n: answered[n].event.delay or 0.0)
+            if any(person.talk.may_answer_before(answered[first]) for person in self.persons.values()):
+                return
             told = partial(_answered_for_all, *answered.pop(first))
+            self._unknown = {}  # what has waited for it goes on
             for person in list(self.persons.values()):  # who has left meanwhile was asked, too
                 self._apply(person, at, told)
 

@@ -263,16 +263,24 @@ class SessionScene:
         """True if a look at `target` is one at the face of a person or of the robot."""
         return target == self.robot or target in self.present
 
-    def note_spoken(self, spoken: Spoken) -> None:
-        """Remember a speech whose addressees are known now."""
+    def note_spoken(self, spoken: Spoken, at: Seconds) -> None:
+        """Remember a speech whose addressees are known at `at`."""
         self.floor_changes += 1
-        if not spoken.is_noted:
-            spoken.is_noted = True
+        if spoken.noted_at == inf:
+            spoken.noted_at = at
             self.spoken.append(spoken)
 
     def spoken_since(self, actor: str, since: Seconds) -> Spoken | None:
         """The speech that began then; None: it is not known to whom it was, or long ago."""
         return next((each for each in self.spoken if each.actor == actor and each.since == since), None)
+
+    def is_last(self, person: str, since: Seconds) -> bool:
+        """True if neither the person nor the robot has begun to say something to the other since."""
+        said = [each for each in self.spoken if each.since > since and not (each.is_noise or each.may_be_noise)]
+        robot = self.robot
+        return not any(
+            each.is_to(robot) if each.actor == person else each.actor == robot and each.is_to(person) for each in said
+        )
 
     def forget_spoken(self, spoken: Spoken) -> None:
         """Forget a speech that was another one's: two have told of it."""
@@ -291,8 +299,8 @@ class SessionScene:
         known = [
             each for each in self.spoken if each.named and not (each.is_open or each.may_be_noise or each.is_noise)
         ]
-        over = [(each.until, each.since, each) for each in known if each.until is not None]
-        return [each for _, _, each in sorted(over, key=lambda one: one[:2])[-ENDED_TOLD:]]
+        over = [(each.until, each.since, each.actor, each) for each in known if each.until is not None]
+        return [one[-1] for one in sorted(over, key=lambda one: one[:-1])[-ENDED_TOLD:]]
 
     @property
     def robot_speaks_since(self) -> Seconds | None:

@@ -281,7 +281,7 @@ class Session:
     def _robot_speaks(self, began: ActionBegan, at: Seconds) -> None:
         self.scene.speaks(self.robot)
         self.scene.robot_spoken = Spoken(actor=self.robot, since=at, to=self.addressees_of(began.behavior) or WHOEVER)
-        self.scene.note_spoken(self.scene.robot_spoken)
+        self.scene.note_spoken(self.scene.robot_spoken, at)
 
     def _say(self, began: ActionBegan, at: Seconds, step: Step) -> None:
         """Tell what the robot says or shows to those to whom it is; to all if that is not known."""

@@ -36,9 +36,9 @@ from engage_hri.services.recognition.events.addressing import (
 from engage_hri.services.recognition.events.conversation import Conversation
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.kinds import KindRecognizer
-from engage_hri.services.recognition.events.limits import ROUNDING, LimitClock
+from engage_hri.services.recognition.events.limits import ROUNDING, LimitClock, in_time
 from engage_hri.services.recognition.events.listener_sign import WORDS_WAIT, SignPart
-from engage_hri.services.recognition.events.machine import EventWriter, OngoingEvent
+from engage_hri.services.recognition.events.machine import Answered, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import Question, SessionScene
 from engage_hri.services.text.listening import is_listening, says_words
 
@@ -91,12 +91,16 @@ class Talk(KindRecognizer):
         pair = self._conversation.exchange.pair
         return pair.event.started if pair.event is not None and pair.may_be_answered else self._asked_in_line
 
-    @property
-    def has_answered_since(self) -> Seconds:
-        """Start of what answers the robot's turn, or may; infinite: nothing does."""
+    def may_answer_before(self, answered: Answered) -> bool:
+        """True if the person has answered the same turn of the robot, too, or may have, and has begun before."""
         pair, sign = self._conversation.pair, self._conversation.listener.sign
-        since = [each.since for each in sign.speeches] if sign is not None else []
-        return min([*since, pair.interrupted_since, *(at for at, _ in islice(self._line, 1))])
+        is_asked = pair.is_turn(answered.event.turn)
+        since = [at for at, _ in islice(self._line, 1)]
+        if is_asked:
+            since.append(pair.interrupted_since)
+        if sign is not None and (sign.is_beside or is_asked):
+            since += [each.since for each in sign.speeches]
+        return min(since, default=inf) < answered.began - ROUNDING
 
     @property
     def is_under_way(self) -> bool:
@@ -275,8 +279,8 @@ class Talk(KindRecognizer):
                 self.take_early(speech.since, lambda talk: talk.speaks(speech.part, beside=speech.is_beside))
             elif speech.is_into_turn or speech.is_beside:
                 speech.part.taken_for = "noise"  # as such it is judged by its words
-            else:
-                self.take_early(speech.since, lambda talk: talk.has_said(speech.part))
+            elif self._scene.is_last(self.id, speech.since):  # what either has said since may wait in line
+                self.take_early(speech.since, lambda talk: talk.exchange.take(speech.part))
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         """Take the person's leaving: nothing waits any longer."""
@@ -408,9 +412,9 @@ class Talk(KindRecognizer):
 
     def abort(self, at: Seconds, *, turn: str) -> None:
         # Who has interrupted the turn has done so before that, also if it is known only now, and told of `at`.
-        cut_off = CutOff(lambda talk: talk.abort(at, turn=turn))
-        if self._line or (self.asked_since < inf and self._scene.is_contested(self.id, at)):
-            self._line.append((nextafter(at, inf), cut_off))
+        cut_off, since = CutOff(lambda talk: talk.abort(at, turn=turn)), nextafter(at, inf)
+        if self._line or (self.asked_since < inf and self._scene.is_contested(self.id, since)):
+            self._line.append((since, cut_off))
         else:
             cut_off.step(self._conversation)
 
@@ -431,8 +435,10 @@ class Talk(KindRecognizer):
     @property
     def _is_behind_others(self) -> bool:
         """True if the first in line waits until it is known whether somebody else has answered before."""
-        since = self.undecided_since
-        if since is None or isinstance(self._line[0][1], CutOff):
+        since, (at, first) = self.undecided_since, self._line[0]
+        if any(each.began <= at and not self.may_answer_before(each) for each in self._writer.answered):
+            return True  # it is to be told first that this has answered for all
+        if since is None or isinstance(first, CutOff):
             return since is not None and self._scene.is_contested(self.id, since)
         return self._waits_for_others(since)
 
@@ -477,7 +483,7 @@ class Talk(KindRecognizer):
             self._writer.decide_interjection(self.id, speech.since, "other", at)
         elif speech.until is None:
             self._may_interrupt(speech, "", at)
-        self._scene.note_spoken(speech)
+        self._scene.note_spoken(speech, at)
 
     def _queue(self, at: Seconds, speech: OwnSpeech) -> None:
         is_next = speech.is_to(self._scene.robot) and self._waits_for_others(at)
@@ -496,7 +502,8 @@ class Talk(KindRecognizer):
             self._is_known_speech(speech, is_known=not is_sign)
 
     def _decide(self, speech: OwnSpeech, at: Seconds) -> None:
-        """Decide what the sound is, by what is known: nothing, if it is over and has no words; else to whom it is."""
+        """Decide what the sound is, by what was known when it was due: nothing, or to whom it is."""
+        at = min(at, self._decided_at(speech))  # it may have waited in line since
         to = self._likely(speech, at) if speech.to is None else speech.to
         is_judged_here = not self._is_into_words(speech) or self._scene.robot not in to
         is_noise = is_judged_here and speech.may_be_noise and speech.until is not None
@@ -512,11 +519,12 @@ class Talk(KindRecognizer):
         """Addressees of a speech by what is likely."""
         if speech.until is None:
             speech.faces.turns(speech.faces.face, at)
-        waits = self._conversation.exchange.pair.may_be_answered_with("speak")
+        pair = self._conversation.exchange.pair
+        waits = pair.may_be_answered_with("speak") and in_time(speech.since, pair.deadline)
         awaited_by = frozenset((self._scene.robot,)) if waits else NOBODY
         is_untold = self._scene.tells_addressees and not says_words(speech.words)
         within = self._config.adjacency_pair_limit
-        return likely(speech, self._scene.spoken, within=within, awaited_by=awaited_by, is_untold=is_untold)
+        return likely(speech, self._scene.spoken, by=at, within=within, awaited_by=awaited_by, is_untold=is_untold)
 
     def may_go_on(self, now: Seconds) -> bool:
         """True if it is decided by `now` to whom the first speech in line is, or if what is decided may be told."""
@@ -532,6 +540,7 @@ class Talk(KindRecognizer):
             self._catch_up(at)
             if isinstance(item, OwnSpeech):
                 self._conversation.listener.next_begins()
+                self._catch_up(at)  # the sign may have held the pair
             if (speech := self._undecided_first) is not None:
                 if self._decided_at(speech) > now:
                     break
