@@ -367,24 +367,6 @@ async def test_what_becomes_of_who_does_nothing_and_what_a_visitor_is_told_first
 
 
 @needs_browser
-async def test_what_one_can_say_is_said_at_a_touch(tmp_path: Path, place: Place) -> None:
-    said = "[...document.querySelectorAll('.bubble.you span')].map((each) => each.textContent).join('')"
-    sizes = "[...document.querySelectorAll('.saying')].map((each) => each.getBoundingClientRect().height)"
-    phrases = '["where is the cup", "thank you"]'
-    console = ("console", "--connect", place.endpoint, "--port", "0", "--role", "wizard")
-    with engage(tmp_path / "console", *console, "--set", f"hearing.phrases={phrases}") as window:
-        url = waited(window, tmp_path / "console", STAGE)
-        async with opened(place._replace(stage=url)) as page:
-            await sit(page)
-            assert all(height >= 44 for height in await page.value(sizes))
-            await press(page, ".saying")
-            await page.until(f"{said}.includes('where is the cup')")
-            assert await page.value(SCROLLS) == 0
-    async with opened(place) as page:  # nobody knows what one can say
-        assert await page.value("document.querySelector('.sayings').hidden")
-
-
-@needs_browser
 async def test_nobody_is_told_to_press_a_microphone_that_was_just_not_to_be_had(place: Place) -> None:
     hint = "document.querySelector('.hint').textContent"
     none = "navigator.mediaDevices.getUserMedia = async () => { throw new DOMException('no', 'NotFoundError'); };"

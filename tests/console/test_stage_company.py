@@ -3,13 +3,16 @@
 import asyncio
 import importlib.util
 from contextlib import AsyncExitStack
+from pathlib import Path
 
 import pytest
 
 from engage_hri import connect, perceive
 from engage_hri.services.bus.zenoh.hub import open_hub
-from tests.console.test_stage import CALM, HIDDEN, PHONE, SEAT, Place, needs_browser, opened, press, sit
+from tests.console.browser import waited
+from tests.console.test_stage import CALM, HIDDEN, PHONE, SEAT, STAGE, Place, needs_browser, opened, press, sit
 from tests.console.test_stage import place as place
+from tests.console.windows import engage
 
 pytestmark = [
     pytest.mark.real_time,
@@ -76,3 +79,21 @@ async def test_a_third_visitor_reads_each_name_and_to_whom_the_robot_speaks(plac
             saying = asyncio.create_task(robot.perform(turn, addressee="ben"))
             await page.until(f"{hint} === 'The robot is speaking to ben.'", 20)
             await saying
+
+
+@needs_browser
+async def test_what_one_can_say_is_said_at_a_touch(tmp_path: Path, place: Place) -> None:
+    said = "[...document.querySelectorAll('.bubble.you span')].map((each) => each.textContent).join('')"
+    sizes = "[...document.querySelectorAll('.saying')].map((each) => each.getBoundingClientRect().height)"
+    phrases = '["where is the cup", "thank you"]'
+    console = ("console", "--connect", place.endpoint, "--port", "0", "--role", "wizard")
+    with engage(tmp_path / "console", *console, "--set", f"hearing.phrases={phrases}") as window:
+        url = waited(window, tmp_path / "console", STAGE)
+        async with opened(place._replace(stage=url)) as page:
+            await sit(page)
+            assert all(height >= 44 for height in await page.value(sizes))
+            await press(page, ".saying")
+            await page.until(f"{said}.includes('where is the cup')")
+            assert await page.value(SCROLLS) == 0
+    async with opened(place) as page:  # nobody knows what one can say
+        assert await page.value("document.querySelector('.sayings').hidden")

@@ -41,4 +41,4 @@ async def test_a_file_is_heard_by_a_process_that_ends_with_it(tmp_path: Path):
 
 def test_a_source_is_for_hearing_alone(capsys: pytest.CaptureFixture[str]):
     told = engage(capsys)("run", "realizer", "--from", "said.wav")
-    assert (told.code, "--from is for hearing or eyes" in told.err) == (2, True)
+    assert (told.code, "--from is for hearing, eyes or pieces" in told.err) == (2, True)

@@ -112,6 +112,18 @@ export function bar({ top, bottom, order, turn, session, examples, spoken }) {
     return made;
   }));
   sayings.hidden = !examples.length;
+  // As many as there is room for: nobody has to scroll.
+  new ResizeObserver(() => {
+    if (!sayings.clientWidth) return;
+    const { paddingLeft, paddingRight, columnGap } = getComputedStyle(sayings);
+    let left = sayings.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight);
+    for (const each of sayings.children) {
+      each.hidden = false;
+      left -= each.offsetWidth;
+      each.hidden = left < 0;
+      left -= parseFloat(columnGap);
+    }
+  }).observe(sayings);
   const here = element("div", { class: "here" }, sayings, form, element("div", { class: "quickly" }, ...quick, nod, point, leave));
   bottom.append(hint, away, here);
 

@@ -4,6 +4,7 @@ const DETECTED = 128; // pixels of the side of a picture that the detector takes
 const MESHED = 192;
 const EVERY = 5; // pictures after which the detector looks for who has come
 const SURE = 0.5; // confidence from which on there is a face
+const REFINED = 4; // squares that are tried for a new face, each by the points that were found in the one before
 const SAME = 0.3; // share of two boxes that they have in common, from which on they are one face
 const LARGER = 1.5; // side of the square around a face, by that of its points
 const POINTS = 468;
@@ -21,32 +22,50 @@ export function finder(detect, mesh, most) {
 
   // picture: width, height and data (four bytes a pixel). Returns the points of each face (x, y, depth in pixels), and the confidence that it is one.
   function find(picture) {
-    const crops = [...known];
-    if (crops.length < most && (count % EVERY === 0 || !crops.length)) {
-      for (const fresh of sought(picture, !crops.length)) {
-        if (!crops.some((old) => isSame(fresh, old))) crops.push(around(meshed(picture, fresh).points));
-      }
+    const before = known;
+    const found = [];
+    known = [];
+    for (const crop of before) take(picture, crop, found);
+    if (found.length < most && (count % EVERY === 0 || !found.length)) {
+      for (const crop of sought(picture, !found.length)) take(picture, crop, found);
     }
     count += 1;
-    known = [];
-    const found = [];
-    for (const crop of crops.slice(0, most)) {
-      const face = meshed(picture, crop);
-      const there = around(face.points);
-      if (face.confidence < SURE || known.some((old) => isSame(there, old))) continue;
-      known.push(there);
-      found.push(face);
-    }
     return found;
+  }
+
+  // Adds the face in a square, if there is one that is not among those that were found, and room for it.
+  function take(picture, crop, found) {
+    if (found.length === most || known.some((old) => isSame(crop, old))) return;
+    const face = meshed(picture, crop);
+    const there = around(face.points);
+    if (face.confidence < SURE || known.some((old) => isSame(there, old))) return;
+    known.push(there);
+    found.push(face);
+  }
+
+  // The square with the surest face, by the points that are found in one after the other; null: none is sure.
+  function refined(picture, crop) {
+    let best = null;
+    let surest = SURE;
+    for (const first of [crop, { ...crop, angle: 0 }]) {
+      for (let each = first, n = 0; n < REFINED; n += 1) {
+        const { points, confidence } = meshed(picture, each);
+        if (confidence >= surest) [best, surest] = [each, confidence];
+        each = around(points);
+      }
+      if (best) break;
+    }
+    return best;
   }
 
   // In the whole picture, and now and then in parts of it, in which who is far is larger: all of them, if nobody is known or near.
   function sought(picture, isAlone) {
-    const found = detected(picture, { left: 0, top: 0, width: picture.width, height: picture.height });
+    const surest = (crops) => crops.map((crop) => refined(picture, crop)).filter(Boolean);
+    const found = surest(detected(picture, { left: 0, top: 0, width: picture.width, height: picture.height }));
     if (count % EVERY !== 0) return found;
     let looked = parts(picture);
     if (found.length || !isAlone) looked = [looked[Math.floor(count / EVERY) % looked.length]];
-    return [...found, ...looked.flatMap((part) => detected(picture, part))];
+    return [...found, ...looked.flatMap((part) => surest(detected(picture, part)))];
   }
 
   // Squares in a part of a picture in which faces may be, the surest first.
