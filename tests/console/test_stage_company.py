@@ -10,7 +10,19 @@ import pytest
 from engage_hri import connect, perceive
 from engage_hri.services.bus.zenoh.hub import open_hub
 from tests.console.browser import waited
-from tests.console.test_stage import CALM, HIDDEN, PHONE, SEAT, STAGE, Place, needs_browser, opened, press, sit
+from tests.console.test_stage import (
+    CALM,
+    HIDDEN,
+    PHONE,
+    SCROLLS,
+    SEAT,
+    STAGE,
+    Place,
+    needs_browser,
+    opened,
+    press,
+    sit,
+)
 from tests.console.test_stage import place as place
 from tests.console.windows import engage
 
