@@ -83,6 +83,11 @@ def renamed(message: AnyStruct, name: Callable[[str], str]) -> AnyStruct:
     return changed
 
 
+def joined(message: AnyStruct, other: str, name: str) -> AnyStruct:
+    """Return the message with `name` in place of another id of the same person."""
+    return renamed(message, lambda id: name if id == other else id)
+
+
 def _one_each(before: World, after: World) -> tuple[Entity, ...]:
     latest: dict[str, Entity] = {}
     for was, entity in zip(before.entities, after.entities, strict=True):

@@ -27,7 +27,7 @@ from engage_hri.services.generation.head.policies import OWN, arranged
 from engage_hri.services.generation.head.policy import HeadPolicy
 from engage_hri.services.generation.head.scene import NOBODY, HeadScene, Observation
 from engage_hri.services.generation.inhibitions import Inhibition
-from engage_hri.services.reports.same_people import renamed
+from engage_hri.services.reports.same_people import joined
 
 DWELL: Seconds = 0.3
 """Time that the head stays after its owner let go, before a lower claim gets it: a claim that comes back at once
@@ -190,14 +190,10 @@ class Arbiter:
 
     def join(self, other: str, name: str) -> None:
         """Take two ids for one person, who is called `name` from now on. The next world has nobody called `other`."""
-
-        def joined(id: str) -> str:
-            return name if id == other else id
-
         self._scene.join(other, name)
         self._ask(lambda policy: policy.join(other, name))
-        self._scene.owner = renamed(self._owner, joined)
-        self._base, self._held = renamed(self._base, joined), renamed(self._held, joined)
+        self._scene.owner = joined(self._owner, other, name)
+        self._base, self._held = joined(self._base, other, name), joined(self._held, other, name)
 
     def shift_failed(self, id: str, now: Seconds) -> None:
         """Note that shift `id` did not arrive: the same place is tried again after a pause, any other at once."""

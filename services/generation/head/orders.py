@@ -8,7 +8,7 @@ from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.head.policy import HeadPolicy
 from engage_hri.services.generation.head.scene import HeadScene
 from engage_hri.services.generation.inhibitions import Inhibition
-from engage_hri.services.reports.same_people import renamed
+from engage_hri.services.reports.same_people import joined
 
 
 class InhibitionPolicy(HeadPolicy):
@@ -55,7 +55,4 @@ class FragmentPolicy(HeadPolicy):
         return self.gaze or self._thought
 
     def join(self, other: str, name: str) -> None:
-        def joined(id: str) -> str:
-            return name if id == other else id
-
-        self.gaze, self._thought = (each and renamed(each, joined) for each in (self.gaze, self._thought))
+        self.gaze, self._thought = (each and joined(each, other, name) for each in (self.gaze, self._thought))
