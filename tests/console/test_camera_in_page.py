@@ -138,10 +138,12 @@ async def sitting(here: HeardPlace, before: str = "", url: str = "") -> AsyncIte
                     one.came.set()
 
             listens = asyncio.create_task(listen())
-            yield one
-            listens.cancel()
-        await page.value("window.engage.send({ do: 'leave' })")
-        await page.until("!window.engage.state.you.person")
+            try:
+                yield one
+            finally:  # a seat that nobody has left is kept for a while, and the next test finds it taken
+                listens.cancel()
+                await page.value("window.engage.send({ do: 'leave' })")
+                await page.until("!window.engage.state.you.person")
 
 
 def ahead(landmarks: FaceLandmarks) -> Floats:
