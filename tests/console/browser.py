@@ -89,13 +89,14 @@ class Page:
         except TimeoutError as error:
             raise TimeoutError(f"not within {seconds} s: {script}; errors: {self.errors}") from error
 
-    async def look(self, width: int, height: int, *, dark: bool = False) -> None:
-        """Take the size of a screen, and its colours."""
+    async def look(self, width: int, height: int, *, dark: bool = False, calm: bool = False) -> None:
+        """Take the size of a screen, and its colours. calm: nothing moves by itself; the stage is drawn finely."""
         await self.call(
             "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False
         )
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
-        await self.call("Emulation.setEmulatedMedia", features=[scheme])
+        motion = {"name": "prefers-reduced-motion", "value": "reduce" if calm else ""}
+        await self.call("Emulation.setEmulatedMedia", features=[scheme, motion])
 
     async def picture(self, *, whole: bool = True, scale: float = 1.0) -> bytes:
         """A PNG of the page as it is. whole: also what one has to scroll to. scale: below 1: smaller."""

@@ -56,13 +56,13 @@ async def take(url: str, port: int) -> None:
 async def take_stage(url: str, port: int) -> None:
     """Sit down at the stage, and take pictures while the robot speaks: a phone, a laptop, and a phone in the dark."""
     async with browser.at_port(port) as running, running.page() as page:
-        await page.look(390, 844)
+        await page.look(390, 844, calm=True)
         await page.go(url)
         await page.until("window.stage?.state.scene?.body && window.stage.shown.isStill", 60)
         (FOLDER / "stage-welcome.png").write_bytes(await page.picture(whole=False))
         await page.value("document.querySelector('.sit').click()")
         for name, (width, height), dark, scale in STAGES:
-            await page.look(width, height, dark=dark)
+            await page.look(width, height, dark=dark, calm=True)
             await page.until("document.querySelectorAll('.bubble.robot.on span').length > 4", 60)
             await page.value("new Promise((done) => setTimeout(done, 1500))")
             (FOLDER / f"stage-{name}.png").write_bytes(await page.picture(whole=False, scale=scale))

@@ -52,7 +52,6 @@ HIDDEN = """(({ scene, person }, { onPage }) => {
   });
 })(window.stage.state, window.stage.shown)"""
 """What lies on the page behind the head or the back of somebody else."""
-CALM = [{"name": "prefers-reduced-motion", "value": "reduce"}]
 SCROLLS = """(({ scrollHeight, scrollWidth }) => scrollY + scrollHeight - innerHeight + scrollWidth - innerWidth
 )(document.documentElement)"""
 LATER = """void ((by) => {
@@ -449,7 +448,7 @@ async def test_it_fits_every_screen_without_scrolling(place: Place) -> None:
                 assert await page.value(SCROLLS) == 0
                 assert await page.value(TOO_SMALL) == []
                 assert await page.value(OUTSIDE) == [], (width, height)
-                await page.call("Emulation.setEmulatedMedia", features=CALM)  # the camera is at once where it goes
+                await page.look(width, height, calm=True)  # the camera is at once where it goes
                 await page.until("window.stage.shown.isStill")
                 assert await page.value(CUT) == [], (width, height)
             await page.look(*PHONE)

@@ -11,7 +11,6 @@ from engage_hri import connect, perceive
 from engage_hri.services.bus.zenoh.hub import open_hub
 from tests.console.browser import waited
 from tests.console.test_stage import (
-    CALM,
     HIDDEN,
     PHONE,
     SCROLLS,
@@ -50,8 +49,7 @@ async def test_two_visitors_see_the_table_each_from_their_own_place_and_are_call
             assert (await other.value(words))[1].startswith("Somebody is here already. ")
             await sit(other)
             for width, height in (PHONE, (1366, 768)):
-                await other.look(width, height)
-                await other.call("Emulation.setEmulatedMedia", features=CALM)
+                await other.look(width, height, calm=True)
                 isStill = f"window.stage.box.width === {width} && window.stage.shown.isStill"
                 await other.until(f"{isStill} && !({HIDDEN}).length")
         named = """import('./stage/words.js').then(({ texts }) => ["en", "de"].map((name) => texts(name, "en"))

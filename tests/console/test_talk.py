@@ -69,7 +69,7 @@ async def seated(place: Talking, before: str = "", more: str = "") -> AsyncItera
 
 
 async def fits(page: Page) -> None:
-    """What the next picture shows is whole and large enough. Before it the page has not put in order what has changed."""
+    """What the next picture shows is whole and large enough. Before it the page puts its changes in order."""
     await page.value("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(0))))")
     assert [await page.value(each) for each in (SCROLLS, TOO_SMALL, OUTSIDE)] == [0, [], []]
 

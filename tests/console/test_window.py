@@ -73,7 +73,8 @@ async def opened(place: Place, url: str = "") -> AsyncIterator[Page]:
         await page.go(url)
         await page.until("window.engage?.state.scene?.body && window.engage.state.you", 60)
         yield page
-        await page.value("window.engage.state.you?.person && window.engage.send({ do: 'leave' });0")  # a seat is kept for a while
+        # A seat of which the page goes is kept for a while, and the next test would find two people.
+        await page.value("window.engage.state.you?.person && window.engage.send({ do: 'leave' });0")
         await page.until("!window.engage.state.you?.person")
         home = url.split("/")[2]
         strangers = [each for each in page.requests if not each.startswith("data:") and each.split("/")[2] != home]

@@ -5,6 +5,7 @@ import { keep, makePerson, makePiece, makeRobot, makeStool, placeOf, vector } fr
 const SMOOTH = 0.09; // seconds in which a figure comes two thirds nearer to where it is to be
 const SLOW = 45; // ms of a picture above which it gives up shadows and fine dots: without a graphics card
 const OFTEN = 4; // pictures in a row that are slow: the first one or two are slow everywhere
+const COARSE = [1, 0.7, 0.5]; // dots of a picture for one of the page, one after the other, until it is not slow any more
 const LEANS = 0.15; // metres by which a head moves while the robot stays where it is
 const ROOM = 0.1; // metres around a thing that are in view
 const WIDE = 34; // degrees that the camera sees, upright
@@ -19,10 +20,20 @@ const LIGHTS = {
   dark: { sky: "#8fa6d8", ground: "#241c2b", ambient: 1.1, lamp: "#ffdca8", strength: 2.4, shadow: 0.45, cone: 0.5 },
 };
 
+// Where there is no graphics card the processor draws, under one of these names: smooth edges and shadows take most of its time.
+const BY_PROCESSOR = /swiftshader|llvmpipe|softpipe|basic render/i;
+function hasCard() {
+  const context = document.createElement("canvas").getContext("webgl2");
+  const names = context?.getExtension("WEBGL_debug_renderer_info");
+  return !BY_PROCESSOR.test(context?.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : context.RENDERER));
+}
+
 export function scene(place, insets) {
-  const renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true, powerPreference: "low-power" });
+  const still = matchMedia("(prefers-reduced-motion: reduce)"); // then pictures are few, and may take their time
+  const isFine = still.matches || hasCard();
+  const renderer = new THREE.WebGLRenderer({ antialias: isFine, alpha: true, powerPreference: "low-power" });
   renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
-  renderer.shadowMap.enabled = true;
+  renderer.shadowMap.enabled = isFine;
   renderer.shadowMap.type = THREE.PCFSoftShadowMap;
   renderer.toneMapping = THREE.ACESFilmicToneMapping;
   place.append(renderer.domElement);
@@ -35,7 +46,6 @@ export function scene(place, insets) {
   const pieces = new Map();
   const people = new Map();
   const looks = makeLooks(world);
-  const still = matchMedia("(prefers-reduced-motion: reduce)");
 
   let told = null;
   let you = "";
@@ -44,6 +54,8 @@ export function scene(place, insets) {
   let last = 0;
   let cost = 0; // ms of a picture of late
   let slow = 0; // pictures in a row that took too long
+  let coarse = -1; // which of COARSE it has come to
+  let drawn = 0; // when the last picture was begun, if the browser has not come back since
   const eye = { from: new THREE.Vector3(...FROM.wide.side), at: new THREE.Vector3(0.5, 0, 0.85), far: 4 };
 
   const size = () => {
@@ -55,6 +67,21 @@ export function scene(place, insets) {
     isStale = true;
   };
   new ResizeObserver(size).observe(place);
+
+  // A picture is drawn after it was asked for, by another process or a card: until it is, the browser does not come back.
+  function weigh(now) {
+    if (!drawn || still.matches) return;
+    const took = Math.min(now - drawn, 250); // a page that was hidden comes back late, too
+    drawn = 0;
+    cost += (took - cost) * 0.1;
+    slow = took > SLOW ? slow + 1 : 0;
+    if (slow < OFTEN || coarse === COARSE.length - 1) return;
+    slow = 0;
+    coarse += 1;
+    renderer.shadowMap.enabled = false;
+    renderer.setPixelRatio(COARSE[coarse]);
+    world.traverse((each) => each.material && (each.material.needsUpdate = true));
+  }
 
   let top = [0, 0, 1.17]; // where its eyes are, but for what they do as it nods and leans: that does not move the camera
   const company = () => Boolean(told?.people.some((each) => each.at && each.present));
@@ -154,6 +181,7 @@ export function scene(place, insets) {
     },
     // bonds: looks that are shared shine. Returns whether something was drawn.
     draw(now, bonds, dark) {
+      weigh(performance.now());
       const passed = Math.min(0.25, now - last);
       const part = last === 0 || still.matches ? 1 : 1 - Math.exp(-passed / SMOOTH);
       const isCalm = still.matches || cost > SLOW; // nothing moves but what moves out there
@@ -161,7 +189,7 @@ export function scene(place, insets) {
       if (!isStale && !isDrifting) return false;
       if (passed < (cost > SLOW ? 0.15 : 0.015)) return false;
       last = now;
-      const began = performance.now();
+      drawn = performance.now();
       const moves = [robot, ...pieces.values(), ...people.values()].map((each) => each.step(part)).some(Boolean);
       const turns = look(part, now, isCalm);
       const lives = looks.draw(told, you, bonds, now, isCalm);
@@ -169,14 +197,6 @@ export function scene(place, insets) {
       isStill = turns < 1e-4;
       isStale = moves || turns > 1e-6 || lives;
       renderer.render(world, camera);
-      const took = performance.now() - began;
-      cost += (took - cost) * 0.1;
-      slow = took > SLOW ? slow + 1 : 0;
-      if (slow >= OFTEN && renderer.shadowMap.enabled) {
-        renderer.shadowMap.enabled = false;
-        renderer.setPixelRatio(1);
-        world.traverse((each) => each.material && (each.material.needsUpdate = true));
-      }
       return true;
     },
     // Where a place of the world is on the page, in CSS pixels.
