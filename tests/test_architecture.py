@@ -58,7 +58,7 @@ LAYERS = {
     " > simulation > frameworks > client > recording > reports requests > web > runtime > bus > text",
     "services/web": "links serving > guard outbox > https tokens",
     "services/frameworks": "livekit pipecat realtime > written_turn",
-    "services/door": "service > server > openapi sessions > operations > config",
+    "services/door": "service > server > openapi > operations speaking > config",
     "services/text": "ear own_words > marks > pieces > patterns > calling ends listening",
     "services/bus": "memory zenoh > certificates > interface > subscription > samples > config deadlines journal"
     " keyring",

@@ -15,9 +15,10 @@ from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
 from engage_hri.schemas.summary import Summary, summary
 from engage_hri.schemas.text import joined
+from engage_hri.schemas.tool import ToolInput
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.client.feeds import Feed
-from engage_hri.services.client.language_models import PLAIN_TURN, Piece, ToolInput, stream, summary_of
+from engage_hri.services.client.language_models import PLAIN_TURN, Piece, stream, summary_of
 from engage_hri.services.client.robot import Robot
 
 LONGEST_TURN = 2**16
@@ -111,7 +112,7 @@ class WrittenTurn:
         await self._robot.resume(self._performed())
 
     async def over(self) -> Summary:
-        """Wait for the end of the turn, however it comes; returns what became of it. Cancelling this stops the turn."""
+        """Wait for the end of the turn, however it comes, and return what became of it. Cancelling this stops it."""
         try:
             return await asyncio.shield(self._task)
         except asyncio.CancelledError:

@@ -4,6 +4,7 @@ from collections import deque
 from collections.abc import Collection
 
 import msgspec
+from msgspec import Struct
 
 from engage_hri.schemas.messages import Message
 
@@ -19,7 +20,7 @@ class Outbox:
         self._waiting: deque[str] = deque()
         self._dropped = 0
 
-    def put(self, message: Message) -> bool:
+    def put(self, message: Struct) -> bool:
         """Take a message. Returns True if it now waits for the program."""
         if self._only and message.__struct_config__.tag not in self._only:
             return False
