@@ -161,7 +161,9 @@ class Door:
                 raise _Refused(429, f"{MOST_AT_ONCE} requests are being answered", "wait for answers, then ask again")
             self._calls += 1
             try:
-                body = await _body(request, operation.right.most if operation.body is not None else 0)
+                body = await _body(request, operation.right.most)
+                if operation.body is None and body.strip() not in (b"", b"{}"):
+                    raise InputRefused(Fault(reason="nothing is taken here", where="body", advice="leave it empty"))
                 return _json(await _unless_gone(request, operation.call(self.robot, body, query)))
             finally:
                 self._calls -= 1
@@ -282,7 +284,8 @@ class _SpeakingLink:
             case WriteText(text=text):
                 self._written().write(text)
             case WritePart():
-                self._written().write(said.read())
+                part = said.read()
+                self._written().write(part)
             case EndTurn():
                 self._running().end()
             case StopTurn():
