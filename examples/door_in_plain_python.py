@@ -29,6 +29,17 @@ def ask(method, path, body=None):
     return answer
 
 
+def line_of(stream):
+    """Read a line of what the door tells as it comes: Python 2 has no `readline` for it."""
+    line = b""
+    while not line.endswith(b"\n"):
+        byte = stream.read(1)
+        if not byte:
+            raise SystemExit("the door has closed")
+        line += byte
+    return line.strip()
+
+
 def turn(*parts):
     """Make a turn of words, and of references to objects by their ids."""
     return {"turn_status": "full", "parts": list(parts)}
@@ -44,7 +55,7 @@ lines = news.getresponse()
 told = ask("POST", "/v1/turn", turn({"say": "Thank you."}))
 left = len(told["said"].split())
 while left:
-    line = lines.readline().strip()
+    line = line_of(lines)
     if line:  # an empty one says that the link still stands
         print(json.loads(line.decode("utf-8"))["word"])
         left -= 1
