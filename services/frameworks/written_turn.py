@@ -7,7 +7,7 @@ object; what it said follows from generation's own account of the turn (`TurnClo
 """
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 
 from engage_hri.schemas.blocks import BlockProgress, Feedback
 from engage_hri.schemas.body import WordSpoken
@@ -27,6 +27,9 @@ ACCOUNT_PATIENCE: Seconds = 2.0
 """Time for which the account of a turn that was stopped is waited for: a voice ends its word, which takes less."""
 BEGINNING: Seconds = 0.3
 """Time after a stop in which what was on its way to the robot has begun, or never will: nobody tells that of it."""
+
+STEERING: Seconds = 5.0
+"""Time that the realizer has to hold a block, or to let it go on."""
 
 
 class WrittenTurn:
@@ -54,8 +57,9 @@ class WrittenTurn:
         self._on_start = on_start
         self._on_word = on_word
         self._words: list[str] = []
-        self._block = ""
-        """The block that began last."""
+        self._has_begun = False
+        self._live: dict[str, None] = {}
+        """Its blocks that have begun and not ended, in order."""
         self._waiting: asyncio.Queue[Piece | None] = asyncio.Queue()
         self._written = 0
         self._is_ended = False
@@ -105,11 +109,11 @@ class WrittenTurn:
 
         Raises InputRefused if nothing of the turn is being performed at this moment.
         """
-        await self._robot.hold(self._performed())
+        await self._steer(self._robot.hold)
 
     async def resume(self) -> None:
         """Let it go on from there. Raises as `hold` does."""
-        await self._robot.resume(self._performed())
+        await self._steer(self._robot.resume)
 
     async def over(self) -> Summary:
         """Wait for the end of the turn, however it comes, and return what became of it. Cancelling this stops it."""
@@ -120,10 +124,17 @@ class WrittenTurn:
             await asyncio.wait([self._task])
             raise
 
-    def _performed(self) -> str:
-        if not self._block or self._task.done():
-            raise InputRefused(Fault(reason="nothing of it is being said", where=self.id))
-        return self._block
+    async def _steer(self, steer: Callable[..., Awaitable[tuple[str, ...]]]) -> None:
+        """Steer all blocks of the turn that are live: the next begins before the one that speaks has ended."""
+        refusal = InputRefused(Fault(reason="nothing of it is being said", where=self.id))
+        steered = False
+        for block in tuple(self._live):
+            try:
+                steered |= bool(await steer(block, timeout=STEERING))
+            except InputRefused as error:  # it has ended meanwhile
+                refusal = error
+        if not steered:
+            raise refusal
 
     async def _run(self) -> Summary:
         with self._robot.words() as words, self._robot.feedback() as feedback, self._robot.turns() as turns:
@@ -163,10 +174,15 @@ class WrittenTurn:
 
     async def _follow(self, feedback: Feed[Feedback]) -> None:
         async for told in feedback:
-            if isinstance(told, BlockProgress) and told.progress == "start" and self._is_own(told.block or ""):
-                if not self._block:
-                    self._on_start()
-                self._block = told.block or ""
+            if not isinstance(told, BlockProgress) or told.block is None or not self._is_own(told.block):
+                continue
+            if told.progress == "end":
+                self._live.pop(told.block, None)
+                continue
+            self._live[told.block] = None
+            if not self._has_begun:
+                self._has_begun = True
+                self._on_start()
 
     def _is_own(self, block: str) -> bool:
         name, _, number = block.rpartition("-")
@@ -176,7 +192,7 @@ class WrittenTurn:
         """What was said of a turn that was stopped."""
         first = f"{self.id}-1"
         told = await self._closed(turns, first, BEGINNING)
-        if told is None and self._block:
+        if told is None and self._has_begun:
             told = await self._closed(turns, first, ACCOUNT_PATIENCE - BEGINNING)
         stopped = FragmentOutcome(
             id=first,

@@ -112,7 +112,7 @@ async def test_a_response_is_spoken_and_its_words_go_on_as_they_sound() -> None:
     assert here.kinds(here.up, *ends) == ["BotStartedSpeakingFrame", "BotStoppedSpeakingFrame"]
     assert not here.kinds(here.down, LLMTextFrame)
     assert [each.object for each in here.told[0].references] == ["blue-square"]
-    assert here.told[0].references[0].looked
+    assert here.told[0].references[0].by == "a look"
 
 
 async def test_the_context_has_what_was_heard_of_several_turns() -> None:
