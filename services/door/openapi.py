@@ -11,7 +11,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.messages import MAJOR
 from engage_hri.services.door.operations import OPERATIONS, TOPICS, Operation
 from engage_hri.services.door.speaking import (
-    AnySpeakingOrder,
+    AnyWritingOrder,
     TurnHeld,
     TurnOver,
     TurnResumed,
@@ -19,7 +19,7 @@ from engage_hri.services.door.speaking import (
     WordSounded,
 )
 
-SPEAKING = (*get_args(AnySpeakingOrder), TurnStarted, WordSounded, TurnHeld, TurnResumed, TurnOver)
+SPEAKING = (*get_args(AnyWritingOrder), TurnStarted, WordSounded, TurnHeld, TurnResumed, TurnOver)
 """Structs that go over the link on which turns are written."""
 REFUSALS = {
     400: "Something in it is wrong: nothing has moved.",

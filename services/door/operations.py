@@ -31,39 +31,39 @@ LONGEST_INHIBITION: Seconds = 600.0
 """A request is open for so long."""
 
 
-class Asked(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class StateQuery(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Query of a question. timeout: seconds to wait for who knows it."""
 
     timeout: Seconds = 1.0
 
 
-class AskedOf(Asked, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class PersonQuery(StateQuery, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The same about a person. actor: their id; `all`: all people together."""
 
     actor: str = "all"
 
 
-class Wanted(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class PerformQuery(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Query of what is performed. timeout: seconds to wait until it is accepted: the robot may not be there yet."""
 
     timeout: Seconds = 10.0
 
 
-class WantedTurn(Wanted, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class TurnQuery(PerformQuery, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The same of a turn. await_answer: 1: tell of it when it has been answered, or it is too late."""
 
     await_answer: bool = False
 
 
 class Steered(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What of the robot's performance is meant. block: id of a fragment or block. behavior: of it; empty: all."""
+    """Part of what the robot performs. block: id of a fragment or block. behavior: of it; empty: all of it."""
 
     block: str
     behavior: str = ""
 
 
 class SteeredBlocks(Struct, frozen=True, kw_only=True, tag="steered"):
-    """What was held, goes on or has been stopped. blocks: their ids."""
+    """Answer to what was held, goes on or has been stopped. blocks: their ids."""
 
     blocks: tuple[str, ...]
 
@@ -96,7 +96,7 @@ class FaultsOn(Struct, frozen=True, kw_only=True, tag="faults_on"):
 
 
 class Right(NamedTuple):
-    """What of the bus something comes to. does: with which key."""
+    """Right on the bus that something takes. does: what is done with the key."""
 
     does: Does
     key: str
@@ -113,7 +113,7 @@ class Right(NamedTuple):
 
 
 class Operation(NamedTuple):
-    """What can be asked for. title: what it does. query, body, gives: structs of its parameters and its answer.
+    """Request that can be made. title: what it does. query, body, gives: structs of its parameters and its answer.
 
     is_document: the body may be a document in XML as well. call: what is done, with the body and the query.
     """
@@ -124,7 +124,7 @@ class Operation(NamedTuple):
     right: Right
     call: Call
     gives: type[Struct]
-    query: type[Struct] = Wanted
+    query: type[Struct] = PerformQuery
     body: type[Struct] | None = None
     is_document: bool = False
 
@@ -148,24 +148,24 @@ def queried(kind: type[Struct], given: dict[str, str]) -> Any:
         raise InputRefused(Fault(reason=str(error), where="address", advice=advice)) from error
 
 
-async def _turn(robot: Robot, body: bytes, query: WantedTurn) -> Summary:
+async def _turn(robot: Robot, body: bytes, query: TurnQuery) -> Summary:
     return summary(await robot.perform(body, await_answer=query.await_answer, timeout=query.timeout))
 
 
-async def _fragment(robot: Robot, body: bytes, query: WantedTurn) -> FragmentOutcome:
+async def _fragment(robot: Robot, body: bytes, query: TurnQuery) -> FragmentOutcome:
     return await robot.perform(body, await_answer=query.await_answer, timeout=query.timeout)
 
 
-async def _block(robot: Robot, body: bytes, query: Wanted) -> BlockOutcome:
+async def _block(robot: Robot, body: bytes, query: PerformQuery) -> BlockOutcome:
     return await robot.realize(body, timeout=query.timeout)
 
 
-async def _interrupt(robot: Robot, body: bytes, query: Wanted) -> BehaviorInterrupted:
+async def _interrupt(robot: Robot, body: bytes, query: PerformQuery) -> BehaviorInterrupted:
     meant = decoded(Steered, body)
     return await robot.interrupt(meant.block, meant.behavior, timeout=query.timeout)
 
 
-async def _inhibit(robot: Robot, body: bytes, query: Wanted) -> InhibitionOver:
+async def _inhibit(robot: Robot, body: bytes, query: PerformQuery) -> InhibitionOver:
     wish: Inhibited = decoded(Inhibited, body)
     if not 0 < wish.seconds <= LONGEST_INHIBITION:
         raise InputRefused(Fault(reason=f"not within 0 and {LONGEST_INHIBITION:g} s", where="$.seconds"))
@@ -174,7 +174,7 @@ async def _inhibit(robot: Robot, body: bytes, query: Wanted) -> InhibitionOver:
     return InhibitionOver()
 
 
-async def _set_condition(robot: Robot, body: bytes, query: Wanted) -> StudyCondition:
+async def _set_condition(robot: Robot, body: bytes, query: PerformQuery) -> StudyCondition:
     wish: ConditionWanted = decoded(ConditionWanted, body)
     with robot.conditions() as conditions:
         await robot.set_condition(wish.name, speech_only=wish.speech_only, by=wish.by, timeout=query.timeout)
@@ -183,17 +183,17 @@ async def _set_condition(robot: Robot, body: bytes, query: Wanted) -> StudyCondi
     return told or await robot.condition(query.timeout)
 
 
-async def _switch_faults(robot: Robot, body: bytes, query: Wanted) -> FaultsOn:
+async def _switch_faults(robot: Robot, body: bytes, query: PerformQuery) -> FaultsOn:
     wish: FaultsOn = decoded(FaultsOn, body)
     return FaultsOn(faults=await robot.switch_faults(wish.faults, timeout=query.timeout))
 
 
-async def _capabilities(robot: Robot, body: bytes, query: Asked) -> Capabilities:
+async def _capabilities(robot: Robot, body: bytes, query: StateQuery) -> Capabilities:
     return await robot.capabilities(query.timeout)
 
 
 def _steers(to: Literal["hold", "resume", "stop"]) -> Call:
-    async def steer(robot: Robot, body: bytes, query: Wanted) -> SteeredBlocks:
+    async def steer(robot: Robot, body: bytes, query: PerformQuery) -> SteeredBlocks:
         meant = decoded(Steered, body)
         return SteeredBlocks(blocks=await getattr(robot, to)(meant.block, meant.behavior, timeout=query.timeout))
 
@@ -201,7 +201,7 @@ def _steers(to: Literal["hold", "resume", "stop"]) -> Call:
 
 
 def _steers_all(to: Literal["hold", "resume", "stop"]) -> Call:
-    async def steer(robot: Robot, body: bytes, query: Wanted) -> SteeredBlocks:
+    async def steer(robot: Robot, body: bytes, query: PerformQuery) -> SteeredBlocks:
         return SteeredBlocks(blocks=await getattr(robot, to)(timeout=query.timeout))
 
     return steer
@@ -210,17 +210,17 @@ def _steers_all(to: Literal["hold", "resume", "stop"]) -> Call:
 def _tells(
     what: str, feed: Callable[[Robot], Feed[Any]], told: Callable[[Any], Struct] = lambda state: state
 ) -> Call:
-    async def tell(robot: Robot, body: bytes, query: Asked) -> Struct:
+    async def tell(robot: Robot, body: bytes, query: StateQuery) -> Struct:
         return told(await first_of(feed(robot), what, query.timeout))
 
     return tell
 
 
-async def _person(robot: Robot, body: bytes, query: Asked) -> Entity:
+async def _person(robot: Robot, body: bytes, query: StateQuery) -> Entity:
     return await robot.person(query.timeout)
 
 
-async def _statistics(robot: Robot, body: bytes, query: AskedOf) -> Statistics:
+async def _statistics(robot: Robot, body: bytes, query: PersonQuery) -> Statistics:
     return await robot.statistics(query.actor, query.timeout)
 
 
@@ -240,15 +240,15 @@ STEERING: tuple[tuple[Literal["hold", "resume", "stop"], str], ...] = (
 OPERATIONS = (
     Operation(
         "POST", "/v1/turn", "Speak a turn, as the tool of language models has it; returns when it is over.", _SPEAKS,
-        _turn, Summary, WantedTurn, ToolInput,
+        _turn, Summary, TurnQuery, ToolInput,
     ),
     Operation(
         "POST", "/v1/fragment", "Perform a turn fragment, in JSON or EBML; returns when it is over.", _SPEAKS,
-        _fragment, FragmentOutcome, WantedTurn, TurnFragment, is_document=True,
+        _fragment, FragmentOutcome, TurnQuery, TurnFragment, is_document=True,
     ),
     Operation(
         "POST", "/v1/block", "Realize a BML block, in JSON or BML; returns when it is over.", _REALIZES,
-        _block, BlockOutcome, Wanted, Block, is_document=True,
+        _block, BlockOutcome, PerformQuery, Block, is_document=True,
     ),
     Operation(
         "POST", "/v1/interrupt", "End one behavior of a block, which goes on without it.", _REALIZES,
@@ -269,23 +269,24 @@ OPERATIONS = (
         Right("publishes", keys.INHIBIT), _inhibit, InhibitionOver, body=Inhibited,
     ),
     Operation("GET", "/v1/world", "Tell what is perceived now.", _KNOWS_WORLD,
-              _tells("world", Robot.worlds), World, Asked),
-    Operation("GET", "/v1/person", "Tell who is there, or the first to come.", _KNOWS_WORLD, _person, Entity, Asked),
+              _tells("world", Robot.worlds), World, StateQuery),
+    Operation("GET", "/v1/person", "Tell who is there, or the first to come.", _KNOWS_WORLD,
+              _person, Entity, StateQuery),
     Operation("GET", "/v1/floor", "Tell who speaks, and to whom.", Right("subscribes", keys.FLOOR),
-              _tells("floor", Robot.floor), Floor, Asked),
+              _tells("floor", Robot.floor), Floor, StateQuery),
     Operation("GET", "/v1/statistics", "Tell statistics and engagement of a person, or of all.",
-              Right("subscribes", keys.ANY_STATISTICS), _statistics, Statistics, AskedOf),
+              Right("subscribes", keys.ANY_STATISTICS), _statistics, Statistics, PersonQuery),
     Operation("GET", "/v1/head", "Tell what owns the robot's head, and why.", Right("subscribes", keys.HEAD_OWNER),
-              _tells("owner of the head", Robot.head_owners), HeadOwner, Asked),
+              _tells("owner of the head", Robot.head_owners), HeadOwner, StateQuery),
     Operation("GET", "/v1/capabilities", "Tell what the body says of itself.", Right("asks", keys.DESCRIBE),
-              _capabilities, Capabilities, Asked),
+              _capabilities, Capabilities, StateQuery),
     Operation("GET", "/v1/condition", "Tell the condition of a study.", Right("subscribes", keys.STUDY_CONDITION),
-              _tells("condition of a study", Robot.conditions), StudyCondition, Asked),
+              _tells("condition of a study", Robot.conditions), StudyCondition, StateQuery),
     Operation("PUT", "/v1/condition", "Begin a condition of a study.", Right("publishes", keys.CONDITION),
               _set_condition, StudyCondition, body=ConditionWanted),
     Operation("GET", "/v1/faults", "Tell the faults that a simulated body plays.",
               Right("subscribes", keys.BODY_FAULTS), _tells("state of the body", Robot.body_faults, _faults_of),
-              FaultsOn, Asked),
+              FaultsOn, StateQuery),
     Operation("PUT", "/v1/faults", "Switch on exactly these faults of a simulated body.",
               Right("publishes", keys.FAULTS), _switch_faults, FaultsOn, body=FaultsOn),
 )  # fmt: skip

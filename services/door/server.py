@@ -29,7 +29,7 @@ from engage_hri.services.client.robot import PerformFailed, Robot
 from engage_hri.services.door.openapi import DoorRefusal, document
 from engage_hri.services.door.operations import OPERATIONS, SPEAKS, TOPICS, Operation, Right, queried, topics
 from engage_hri.services.door.speaking import (
-    AnySpeakingOrder,
+    AnyWritingOrder,
     BeginTurn,
     EndTurn,
     HoldTurn,
@@ -77,8 +77,8 @@ class _Refused(Exception):
         self.fault = Fault(reason=reason, advice=advice, where=where, service="door")
 
 
-class Door:
-    """What all requests share. tokens: that of each role that has one."""
+class DoorServer:
+    """Server of all requests. tokens: that of each role that has one."""
 
     def __init__(self, robot: Robot, bus: Bus, tokens: Mapping[str, str]) -> None:
         self.robot = robot
@@ -252,7 +252,7 @@ class Door:
 class _SpeakingLink:
     """A link on which one turn after the other is written."""
 
-    def __init__(self, door: Door, program: WebSocket) -> None:
+    def __init__(self, door: DoorServer, program: WebSocket) -> None:
         self._door = door
         self._program = program
         self._outbox, self._news = Outbox(), asyncio.Event()
@@ -277,7 +277,7 @@ class _SpeakingLink:
                 self._turn.stop()
             await asyncio.wait([sending, *filter(None, [self._following])])
 
-    async def _take(self, said: AnySpeakingOrder) -> None:
+    async def _take(self, said: AnyWritingOrder) -> None:
         match said:
             case BeginTurn():
                 self._begin(said)

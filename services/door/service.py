@@ -10,7 +10,7 @@ from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.client.robot import Robot
 from engage_hri.services.door.config import DoorConfig
-from engage_hri.services.door.server import Door
+from engage_hri.services.door.server import DoorServer
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 from engage_hri.services.web.https import server_keys
@@ -23,7 +23,7 @@ async def open_door(bus: Bus, ready: Ready, config: DoorConfig) -> None:
     tokens = _tokens(config)
     keys = server_keys(Path(config.https), (config.host, "localhost", "127.0.0.1")) if config.https else None
     async with Robot.on(bus) as robot:
-        door = Door(robot, bus, tokens)
+        door = DoorServer(robot, bus, tokens)
         try:
             async with serving(door.application(), config.host, config.port, keys) as port:
                 _tell(bus, config, port, is_safe=keys is not None)

@@ -1,4 +1,4 @@
-"""What goes over a link on which turns are written bit by bit: orders of the program, and news for it. Pure.
+"""Orders and news on a link on which a program writes turns bit by bit. Pure.
 
 A turn begins with the first text or part, or with `begin`, which says what concerns all of it. Text may come in
 whatever bits; `[id]` in it refers to an object. `end` says that all is written: the turn goes on until it is said.
@@ -14,11 +14,11 @@ from engage_hri.schemas.summary import Summary
 from engage_hri.schemas.tool import PARTS, Part, ToolInput
 
 
-class SpeakingOrder(Struct, frozen=True, kw_only=True, tag_field="do", forbid_unknown_fields=True):
+class WritingOrder(Struct, frozen=True, kw_only=True, tag_field="do", forbid_unknown_fields=True):
     """Order of a program."""
 
 
-class BeginTurn(SpeakingOrder, frozen=True, kw_only=True, tag="begin"):
+class BeginTurn(WritingOrder, frozen=True, kw_only=True, tag="begin"):
     """Begin a turn. turn: what concerns all of it: fields of `ToolInput` without its status and parts.
 
     await_answer: tell of its end when it has been answered, or it is too late.
@@ -35,13 +35,13 @@ class BeginTurn(SpeakingOrder, frozen=True, kw_only=True, tag="begin"):
             raise InputRefused(Fault(reason=str(error), where="turn")) from error
 
 
-class WriteText(SpeakingOrder, frozen=True, kw_only=True, tag="text"):
+class WriteText(WritingOrder, frozen=True, kw_only=True, tag="text"):
     """Say this next. text: in whatever bits it comes."""
 
     text: str
 
 
-class WritePart(SpeakingOrder, frozen=True, kw_only=True, tag="part"):
+class WritePart(WritingOrder, frozen=True, kw_only=True, tag="part"):
     """Say or do this next. part: one of `say`, `refer`, `look`, `gesture`, as in the tool of language models."""
 
     part: Raw
@@ -57,60 +57,60 @@ class WritePart(SpeakingOrder, frozen=True, kw_only=True, tag="part"):
             raise InputRefused(Fault(reason=str(error), where="part", advice=advice)) from error
 
 
-class EndTurn(SpeakingOrder, frozen=True, kw_only=True, tag="end"):
+class EndTurn(WritingOrder, frozen=True, kw_only=True, tag="end"):
     """All of the turn is written."""
 
 
-class StopTurn(SpeakingOrder, frozen=True, kw_only=True, tag="stop"):
+class StopTurn(WritingOrder, frozen=True, kw_only=True, tag="stop"):
     """End the turn at the next word."""
 
 
-class HoldTurn(SpeakingOrder, frozen=True, kw_only=True, tag="hold"):
+class HoldTurn(WritingOrder, frozen=True, kw_only=True, tag="hold"):
     """Wait at the next word."""
 
 
-class ResumeTurn(SpeakingOrder, frozen=True, kw_only=True, tag="resume"):
+class ResumeTurn(WritingOrder, frozen=True, kw_only=True, tag="resume"):
     """Go on from there."""
 
 
-AnySpeakingOrder = BeginTurn | WriteText | WritePart | EndTurn | StopTurn | HoldTurn | ResumeTurn
+AnyWritingOrder = BeginTurn | WriteText | WritePart | EndTurn | StopTurn | HoldTurn | ResumeTurn
 
 
-class SpeakingNews(Struct, frozen=True, kw_only=True, tag_field="type"):
+class TurnNews(Struct, frozen=True, kw_only=True, tag_field="type"):
     """News of a turn. turn: its id."""
 
     turn: str
 
 
-class TurnStarted(SpeakingNews, frozen=True, kw_only=True, tag="started"):
+class TurnStarted(TurnNews, frozen=True, kw_only=True, tag="started"):
     """The robot has begun to perform it."""
 
 
-class WordSounded(SpeakingNews, frozen=True, kw_only=True, tag="word"):
+class WordSounded(TurnNews, frozen=True, kw_only=True, tag="word"):
     """A word has been said. said: all words of the turn so far."""
 
     word: str
     said: str
 
 
-class TurnHeld(SpeakingNews, frozen=True, kw_only=True, tag="held"):
-    """It waits."""
+class TurnHeld(TurnNews, frozen=True, kw_only=True, tag="held"):
+    """The turn waits."""
 
 
-class TurnResumed(SpeakingNews, frozen=True, kw_only=True, tag="resumed"):
-    """It goes on."""
+class TurnResumed(TurnNews, frozen=True, kw_only=True, tag="resumed"):
+    """The turn goes on."""
 
 
-class TurnOver(SpeakingNews, frozen=True, kw_only=True, tag="over"):
+class TurnOver(TurnNews, frozen=True, kw_only=True, tag="over"):
     """Nothing more is said. summary: what became of it, cut words and looks among it."""
 
     summary: Summary
 
 
-_orders: "msgspec.json.Decoder[AnySpeakingOrder]" = msgspec.json.Decoder(AnySpeakingOrder)
+_orders: "msgspec.json.Decoder[AnyWritingOrder]" = msgspec.json.Decoder(AnyWritingOrder)
 
 
-def order(text: str) -> AnySpeakingOrder:
+def order(text: str) -> AnyWritingOrder:
     """Read what a program says. Raises InputRefused for what is no order."""
     try:
         return _orders.decode(text)

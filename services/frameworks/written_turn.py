@@ -189,7 +189,7 @@ class WrittenTurn:
         return name == self.id and number.isdecimal()
 
     async def _account(self, turns: Feed[TurnClosed]) -> Summary:
-        """What was said of a turn that was stopped."""
+        """Account of a turn that was stopped."""
         first = f"{self.id}-1"
         told = await self._closed(turns, first, BEGINNING)
         if told is None and self._has_begun:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import Robot
-from engage_hri.services.door.server import Door
+from engage_hri.services.door.server import DoorServer
 from tests.cancelling import whole_robot
 
 TOKENS = {role: f"token-of-{role}" for role in ("observer", "manager", "operator", "wizard")}
@@ -22,7 +22,7 @@ class Answered(NamedTuple):
 class Programs:
     """Programs at one door."""
 
-    def __init__(self, door: Door) -> None:
+    def __init__(self, door: DoorServer) -> None:
         self._app = door.application()
 
     async def ask(
@@ -112,7 +112,7 @@ class Link:
 
 class Stood(NamedTuple):
     programs: Programs
-    door: Door
+    door: DoorServer
     robot: Robot
     hub: MemoryHub
 
@@ -122,5 +122,5 @@ async def at_a_door(*settings: str) -> AsyncIterator[Stood]:
     """A door, and a whole robot behind it. robot: a client beside it."""
     async with MemoryHub() as hub, whole_robot(hub, *settings) as beside, Robot.on(hub.join("door")) as robot:
         robot._bus.declare_alive()
-        door = Door(robot, robot._bus, TOKENS)
+        door = DoorServer(robot, robot._bus, TOKENS)
         yield Stood(Programs(door), door, beside, hub)

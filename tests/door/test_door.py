@@ -14,7 +14,7 @@ from engage_hri.services.client.robot import Robot
 from engage_hri.services.door import server
 from engage_hri.services.door.openapi import document
 from engage_hri.services.door.operations import OPERATIONS, TOPICS
-from engage_hri.services.door.server import Door
+from engage_hri.services.door.server import DoorServer
 from engage_hri.services.web import outbox
 from tests.door.callers import TOKENS, Programs, at_a_door
 
@@ -37,7 +37,7 @@ async def test_each_role_may_what_it_may_on_the_bus_and_a_stranger_nothing() -> 
     assert {*MAY} == {f"{each.method} {each.path}" for each in OPERATIONS}
 
     async with MemoryHub() as hub, Robot.on(hub.join("door")) as robot:
-        programs = Programs(Door(robot, robot._bus, TOKENS))
+        programs = Programs(DoorServer(robot, robot._bus, TOKENS))
         for asked, able in MAY.items():
             method, path = asked.split()
             for role in (*TOKENS, "", "token-of-nobody"):
@@ -48,7 +48,7 @@ async def test_each_role_may_what_it_may_on_the_bus_and_a_stranger_nothing() -> 
 
 async def test_a_door_has_no_more_rights_than_its_own_keys() -> None:
     async with MemoryHub() as hub, Robot.on(hub.join("door", "manager")) as robot:
-        programs = Programs(Door(robot, robot._bus, TOKENS))
+        programs = Programs(DoorServer(robot, robot._bus, TOKENS))
         code, said = await programs.ask("POST", "/v1/robot/stop?timeout=0.1", role="wizard")
 
     assert (code, said["fault"]["reason"]) == (403, "the door has the role manager on the bus, which may not do that")
@@ -64,7 +64,7 @@ async def test_what_is_larger_than_its_key_allows_is_refused_before_it_is_read(
     path: str, most: int, start: bytes, length: bool
 ) -> None:
     async with MemoryHub() as hub, Robot.on(hub.join("door")) as robot:
-        programs = Programs(Door(robot, robot._bus, TOKENS))
+        programs = Programs(DoorServer(robot, robot._bus, TOKENS))
         chunks = [start, b" " * (most - len(start))]
         fits, _ = await programs.ask("POST", f"{path}?timeout=0.1", chunks=chunks, length=length, role="wizard")
         code, said = await programs.ask("POST", path, chunks=[*chunks, b" "], length=length, role="wizard")
@@ -75,7 +75,7 @@ async def test_what_is_larger_than_its_key_allows_is_refused_before_it_is_read(
 
 async def test_more_requests_at_once_than_there_is_room_for_are_refused_and_room_comes_back() -> None:
     async with MemoryHub() as hub, Robot.on(hub.join("door")) as robot:
-        programs = Programs(Door(robot, robot._bus, TOKENS))
+        programs = Programs(DoorServer(robot, robot._bus, TOKENS))
         asked = [programs.ask("GET", "/v1/world?timeout=5") for _ in range(server.MOST_AT_ONCE)]
         waiting = [asyncio.create_task(each) for each in asked]
         await asyncio.sleep(1.0)
@@ -235,7 +235,7 @@ async def test_news_are_of_the_topics_that_were_asked_for() -> None:
 )  # fmt: skip
 async def test_a_link_to_which_there_is_no_right_is_closed_and_told_why(address: str, role: str, closed: int) -> None:
     async with MemoryHub() as hub, Robot.on(hub.join("door")) as robot:
-        programs = Programs(Door(robot, robot._bus, TOKENS))
+        programs = Programs(DoorServer(robot, robot._bus, TOKENS))
         async with programs.link(address, role=role) as link:
             assert await link.got.get() is None
 
