@@ -117,7 +117,8 @@ class RobotOutput:
         self._turn, self._told = None, told
         self._on_turn_over(told)
         if told.status != "done" and not self._is_interrupted and self._session is not None:
-            self._session.interrupt(force=True)  # a person has taken the floor, or the robot has failed
+            with suppress(RuntimeError):  # it is over already
+                self._session.interrupt(force=True)  # a person has taken the floor, or the robot has failed
         self._finish()
 
     def _finish(self) -> None:

@@ -46,7 +46,7 @@ class Programs:
             "type": "http", "method": method, "path": path, "query_string": query.encode(), "headers": headers,
             "http_version": "1.1", "scheme": "http", "server": ("door", 80), "client": ("program", 1),
         }  # fmt: skip
-        code, said = 0, bytearray()
+        code, kind, said = 0, "", bytearray()
 
         async def receive() -> dict[str, Any]:
             if sent:
@@ -55,12 +55,13 @@ class Programs:
             return {"type": "http.disconnect"}
 
         async def send(message: Any) -> None:
-            nonlocal code
+            nonlocal code, kind
             code = message.get("status", code)
+            kind = dict(message.get("headers", ())).get(b"content-type", kind.encode()).decode()
             said.extend(message.get("body", b""))
 
         await self._app(scope, receive, send)
-        return Answered(code, json.loads(said) if said.startswith(b"{") else said.decode())
+        return Answered(code, json.loads(said) if kind == "application/json" else said.decode())
 
     @asynccontextmanager
     async def link(self, address: str, *, role: str = "manager") -> AsyncIterator["Link"]:

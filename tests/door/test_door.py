@@ -227,6 +227,34 @@ async def test_news_are_of_the_topics_that_were_asked_for() -> None:
     assert [each["word"] for each in told[:-1]] == ["Please", "take", "the", "blue", "square"]
 
 
+async def test_all_topics_are_told_at_once_if_none_is_named() -> None:
+    async with at_a_door() as here, here.programs.link("/v1/news", role="observer") as link:
+        await here.programs.ask("POST", "/v1/turn?await_answer=1", TURN)
+        await asyncio.sleep(1.0)
+        told = {link.got.get_nowait()["type"] for _ in range(link.got.qsize())}
+
+    assert told >= {
+        "connection_event", "word_spoken", "turn_closed", "floor", "statistics", "action_began", "head_owner", "held",
+        "study_condition", "block_progress", "sync_point_progress", "world",
+    }  # fmt: skip
+
+
+async def test_news_come_as_lines_too_and_an_empty_one_when_there_are_none() -> None:
+    async with at_a_door() as here:
+        gone = asyncio.Event()
+        hearing = asyncio.create_task(here.programs.ask("GET", "/v1/news?only=words", gone=gone))
+        await asyncio.sleep(1.0)
+        await here.programs.ask("POST", "/v1/turn", TURN)
+        await asyncio.sleep(25.0)
+        gone.set()
+        code, said = await hearing
+
+    lines = said.splitlines()
+    assert code == 200
+    assert [json.loads(each)["word"] for each in lines if each] == ["Please", "take", "the", "blue", "square"]
+    assert lines.count("") == 2
+
+
 @pytest.mark.parametrize(
     ("address", "role", "closed"),
     [("/v1/news", "", 4401), ("/v1/news", "nobody", 4401), ("/v1/speak", "", 4401), ("/v1/speak", "observer", 4403),
