@@ -98,7 +98,7 @@ async def test_a_reply_is_said_by_the_robot_which_looks_where_it_refers_to() -> 
     assert here.states[-2:] == ["speaking", "listening"]
 
 
-@pytest.mark.parametrize("after", [0.3, 1.5, 2.0])
+@pytest.mark.parametrize("after", [0.23 * number for number in range(1, 14)])
 async def test_the_history_of_an_interrupted_reply_has_what_was_said_and_no_more(after: float) -> None:
     async with scene(LONG, ("Sorry.",)) as here:
         running = here.session.run(user_input="Count.")
@@ -111,7 +111,7 @@ async def test_the_history_of_an_interrupted_reply_has_what_was_said_and_no_more
     assert here.history == [*([(said, True)] if said else []), ("Sorry.", False)]
     assert here.told[0].said == said
     assert here.told[0].cut_short
-    assert "ten" not in said
+    assert "on." not in said
     assert after < 1.0 or said.startswith("one two")
 
 
@@ -128,7 +128,7 @@ async def test_a_person_who_takes_the_floor_interrupts_the_session() -> None:
     assert here.history == [(said, True)]
     assert said == here.heard()
     assert said.startswith("one two")
-    assert "ten" not in said
+    assert "on." not in said
 
 
 async def test_a_pause_of_the_session_holds_the_robot_at_a_word() -> None:

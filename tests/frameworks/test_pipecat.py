@@ -123,7 +123,7 @@ async def test_the_context_has_what_was_heard_of_several_turns() -> None:
     assert [each.status for each in here.told] == ["done"] * 3
 
 
-@pytest.mark.parametrize("after", [0.0, 0.1, 0.7, 1.5, 2.3])
+@pytest.mark.parametrize("after", [0.17 * number for number in range(16)])
 async def test_an_interruption_ends_at_a_word_and_the_context_has_no_word_that_nobody_heard(after: float) -> None:
     async with scene() as here:
         await here.play(
@@ -134,7 +134,7 @@ async def test_an_interruption_ends_at_a_word_and_the_context_has_no_word_that_n
     said = here.told[0].said if len(here.told) > 1 else ""
     assert f"{said} Sorry.".strip() == heard
     assert here.kept == [*filter(None, [said]), "Sorry."]
-    assert after == 0.0 or "ten" not in said  # at once, it may come before the text
+    assert after == 0.0 or "on." not in said  # at once, it may come before the text
     assert after < 1.0 or here.told[0].cut_short
 
 

@@ -1,4 +1,4 @@
-"""A turn that is written bit by bit: what it tells of itself is what an independent listener has heard, however it ends."""
+"""A turn that is written bit by bit tells of itself what an independent listener has heard, however it ends."""
 
 import asyncio
 import random
@@ -22,10 +22,9 @@ from engage_hri.services.frameworks.written_turn import LONGEST_TURN, WrittenTur
 from tests.cancelling import whole_robot
 from tests.random_cases import share_of
 
-TEXT = (
-    "Hello there, Ann. Please take [blue-square] and put it next to the others. Then, if you like, go on. Well done!"
-)
-WORDS = "Hello there, Ann. Please take the blue square and put it next to the others. Then, if you like, go on. Well done!"
+REST = "and put it next to the others. Then, if you like, go on. Well done!"
+TEXT = f"Hello there, Ann. Please take [blue-square] {REST}"
+WORDS = f"Hello there, Ann. Please take the blue square {REST}"
 
 
 class Scene(NamedTuple):
