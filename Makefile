@@ -10,7 +10,7 @@ PIP := PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt PIP_D
 PROFILE := same
 CHOSEN := -m "not long"
 
-.PHONY: demo test test-all test-long test-machines mutants lint style docs generate coverage bench reachy-mini eyes clean
+.PHONY: demo test test-all test-long test-machines test-frameworks mutants lint style docs generate coverage bench reachy-mini eyes clean
 
 demo: $(DEMO)
 	@$(BIN)/engage demo $(ARGS)
@@ -35,6 +35,15 @@ test-long: test-all
 test-machines: $(READY) reachy-mini
 	@REACHY_MINI_FULL=1 ENGAGE_PLATFORM=weekly $(BIN)/pytest -n auto --dist loadfile --no-loadscope-reorder \
 		--hypothesis-profile=long tests/lab tests/control/reachy_mini $(ARGS)
+
+# The adaptors of voice frameworks with the real packages, in an environment of their own.
+test-frameworks: build/frameworks/.ready
+	@build/frameworks/bin/python -m pytest tests/frameworks $(ARGS)
+
+build/frameworks/.ready: pyproject.toml
+	@$(BIN)/python -m venv --clear build/frameworks
+	@PIP_DISABLE_PIP_VERSION_CHECK=1 build/frameworks/bin/python -m pip install -qq -e '.[check,livekit,pipecat]' hypothesis
+	@touch $@
 
 # Change the code in one place, and see whether a test notices: tests/mutants. `make mutants ARGS="--folder services/bus"`.
 mutants: build/mutants/seconds.json

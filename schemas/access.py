@@ -261,6 +261,7 @@ TABLE: tuple[Row, ...] = (
         for key in (keys.PERCEIVED_ACTION, keys.UTTERANCE, _OWN_ONGOING, keys.WORLD, keys.ANY_SOUND,
                     keys.ANY_LANDMARKS)
     ),
+    Row("wizard", "publishes", _OWN_SETTINGS, "of the door"),
     Row("wizard", "subscribes", keys.ANY_HEAD_POSE, "for the places of visitors whom a camera of their page sees"),
 )  # fmt: skip
 """The table. `tests/access` checks it against what really flows."""
@@ -274,6 +275,7 @@ PARTICIPANTS = {
     "eyes": "perception",
     "pieces": "perception",
     "collaboration": "manager",
+    "door": "wizard",
 }
 """Roles of the services that have another name."""
 

@@ -41,6 +41,8 @@ SHELLS = {
     "services/recording/replay.py",  # says what was said
     "services/simulation/still.py",  # a world, published once, and what its people do
     "services/tangram/collaboration/host.py",  # asks people who talk
+    "services/door/operations.py",  # calls of the client
+    "services/door/server.py",  # answers requests
     "services/console/follow.py",  # subscribes
     "services/console/terminal/live.py",  # draws
     "services/console/web/links.py",  # waits for what pages send

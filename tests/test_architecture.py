@@ -41,7 +41,7 @@ VISITOR = "examples/plain_zenoh_events.py"
 """Shows how to do without Engage: it may import nothing of it."""
 COMPOSERS = {"commandline"}
 """Packages of `services` that are no service: they put services together and may import all of them."""
-SHARED = {"bus", "requests", "runtime", "client", "tangram", "recording", "reports", "text"}
+SHARED = {"bus", "requests", "runtime", "client", "frameworks", "tangram", "recording", "reports", "text", "web"}
 """Packages of `services` that are no service, and that services may import."""
 PURE_SHARED = {"recording", "reports", "tangram", "text"}
 """Those of them whose files are pure, as those of a service are."""
@@ -53,9 +53,12 @@ KNOW_TANGRAM = (
 The core knows no tangram: docs/decisions/0145."""
 LAYERS = {
     "schemas": "documents > *",
-    "services": "commandline > console control doctor generation perception realizer recognition study"
+    "services": "commandline > console control door doctor generation perception realizer recognition study"
     " > tangram"
-    " > simulation > client > recording > reports requests > runtime > bus > text",
+    " > simulation > frameworks > client > recording > reports requests > web > runtime > bus > text",
+    "services/web": "links serving > guard outbox > https tokens",
+    "services/frameworks": "livekit pipecat realtime > written_turn",
+    "services/door": "service > server > openapi > operations speaking > config",
     "services/text": "ear own_words > marks > pieces > patterns > calling ends listening",
     "services/bus": "memory zenoh > certificates > interface > subscription > samples > config deadlines journal"
     " keyring",
@@ -82,7 +85,10 @@ THREADS = {"threading", "_thread", "concurrent", "multiprocessing"}
 THREAD_CALLS = {"to_thread", "run_in_executor", "Thread", "ThreadPoolExecutor"}
 
 WEB = {"starlette", "uvicorn"}
-WITH_WEB = {f"services/console/web/{name}.py" for name in ("server", "links", "sights", "sounds")}
+WITH_WEB = {
+    *(f"services/console/web/{name}.py" for name in ("server", "links", "sights", "sounds")),
+    "services/web/links.py", "services/web/serving.py", "services/door/server.py",
+}  # fmt: skip
 """The only files with a web stack. They are the exception to "no threads": it reads the files of the page on worker
 threads, which touch nothing of ours; pages, frames and orders stay on the one loop."""
 

@@ -31,6 +31,7 @@ CONTENTS = {
         "study",
         "recordings",
         "language-models",
+        "voice-frameworks",
     ),
     "From other programs": (
         "reference",

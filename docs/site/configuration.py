@@ -15,7 +15,7 @@ PAGE = ROOT / "docs" / "configuration.md"
 SECTIONS = {
     "bus": "bus", "generation": "generation", "realizer": "realizer", "recognition": "recognition",
     "control": "control", "hearing": "perception/hearing",
-    "eyes": "perception/eyes", "pieces": "perception/pieces",
+    "eyes": "perception/eyes", "pieces": "perception/pieces", "door": "door",
     "simulation": "tangram/people", "collaboration": "tangram/collaboration",
 }  # fmt: skip
 """Folder of each section."""

@@ -25,6 +25,7 @@ from engage_hri.schemas.blocks import (
     Held,
     PerformBlock,
 )
+from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.faults import Fault, RunFailed
 from engage_hri.schemas.fragments import (
     FragmentOutcome,
@@ -255,6 +256,11 @@ class Robot(OrderedRobot):
             return self._feed(Feedback.__args__, keys.ANY_FEEDBACK)
         self._requests.check()
         return NewFeed(self._bus, Feedback.__args__, (keys.ANY_FEEDBACK,))
+
+    def words(self) -> Feed[WordSpoken]:
+        """Follow the robot's words: each when it has been said, from now on."""
+        self._requests.check()
+        return NewFeed(self._bus, (WordSpoken,), (keys.SYNC_POINT,))
 
     def faults(self) -> Feed[Fault]:
         """Follow the faults that services tell of: bad messages, and errors while one was taken."""

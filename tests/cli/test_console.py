@@ -10,8 +10,8 @@ import pytest
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.commandline.look import console
 from engage_hri.services.commandline.look import window as shown
-from engage_hri.services.commandline.look.window import kept_token
 from engage_hri.services.recording.disk import read
+from engage_hri.services.web.tokens import kept_token
 from tests.bus.places import free_endpoint
 from tests.cli.command import Engage
 

@@ -11,7 +11,7 @@ from cryptography import x509
 
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.bus.certificates import initialize
-from engage_hri.services.commandline.look.https import ServerKeys, server_keys
+from engage_hri.services.web.https import ServerKeys, server_keys
 
 HOSTS = ("robot.example", "192.0.2.7")
 

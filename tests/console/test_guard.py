@@ -7,7 +7,7 @@ from urllib.parse import urlsplit
 import aiohttp
 import pytest
 
-from engage_hri.services.console.web.guard import Hosts, refusal
+from engage_hri.services.web.guard import Hosts, refusal
 from tests.bus.places import free_endpoint
 from tests.console.browser import waited
 from tests.console.windows import URL, engage

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from engage_hri.schemas.perception import ActionBegan, ActorFound
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.console.web import frames
-from engage_hri.services.console.web.frames import Outbox
+from engage_hri.services.web import outbox
+from engage_hri.services.web.outbox import Outbox
 
 STEPS = st.lists(st.one_of(st.tuples(st.sampled_from(["action_began", "actor_found"])), st.just(())), max_size=60)
 
@@ -24,7 +24,7 @@ def message(type: str, number: int) -> ActionBegan | ActorFound:
 def test_a_program_gets_the_newest_of_its_types_in_order_and_the_number_of_the_others(
     steps: list[tuple[str, ...]], only: tuple[str, ...], most: int
 ) -> None:
-    before, frames.MESSAGES_KEPT = frames.MESSAGES_KEPT, most
+    before, outbox.MESSAGES_KEPT = outbox.MESSAGES_KEPT, most
     try:
         box, expected = Outbox(only), list[int]()
         for number, step in enumerate(steps):
@@ -39,8 +39,8 @@ def test_a_program_gets_the_newest_of_its_types_in_order_and_the_number_of_the_o
             assert [each["at"][1] for each in got] == expected[-most:]
             expected = []
     finally:
-        frames.MESSAGES_KEPT = before
+        outbox.MESSAGES_KEPT = before
 
 
 def test_the_types_are_those_of_the_protocol() -> None:
-    assert {"connection_event", "utterance", "robot_state", "sync_point_reached"} <= frames.message_types()
+    assert {"connection_event", "utterance", "robot_state", "sync_point_reached"} <= outbox.message_types()

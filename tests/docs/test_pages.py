@@ -47,6 +47,8 @@ EXCUSED = {
     "make demo ARGS=--you": "waits for somebody to sit down; tests/console/test_window.py sits down",
     "engage run hearing": "needs a microphone; tests/perception/test_hearing.py has files",
     "engage run hearing --from talk.wav": "the same",
+    "engage run door": "tests/door/test_door_page.py has a robot for it",
+    "make test-frameworks": "fetches 200 MB; it was run with the versions that the page names",
     "make reachy-mini": "takes a minute and a half; .ci/run does it",
     "make eyes": "fetches 83 MB; .ci/run does it",
 }
@@ -73,6 +75,9 @@ ELSEWHERE = {
     ("docs/people.md", "python"): "tests/client/test_people_page.py",
     ("docs/talk.md", "python"): "tests/client/test_small_talk.py",
     ("docs/console.md", "nginx"): "tests/console/test_path.py",
+    ("docs/voice-frameworks.md", "python"): "tests/frameworks",
+    ("docs/other-languages.md", "bash"): "tests/door/test_door_page.py",
+    ("docs/other-languages.md", "javascript"): "tests/door/test_door_page.py",
     ("docs/hostile.md", "sh"): "tests/hostile/test_command.py",
     ("docs/hostile.md", "python"): "tests/hostile/test_docs.py",
 }

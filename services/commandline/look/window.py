@@ -2,15 +2,11 @@
 
 import errno
 import os
-import re
-import secrets
 import sys
 import webbrowser
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager, suppress
-from functools import partial
 from importlib.util import find_spec
-from pathlib import Path
 from socket import AF_INET, AF_INET6, SOCK_DGRAM, gethostname, socket
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -18,22 +14,21 @@ from typing import TYPE_CHECKING, Any
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Hub
-from engage_hri.services.commandline.look.https import server_keys
 from engage_hri.services.commandline.shell.options import Shown
 from engage_hri.services.commandline.shell.outputs import complain
 from engage_hri.services.commandline.shell.process import unique_name
 from engage_hri.services.runtime.installation import extra_command
+from engage_hri.services.web.https import server_keys
+from engage_hri.services.web.tokens import kept_token, new_token
 
 if TYPE_CHECKING:
-    from engage_hri.services.console.web.guard import Hosts
     from engage_hri.services.console.web.service import WindowServer
+    from engage_hri.services.web.guard import Hosts
 
 NEEDED = ("starlette", "uvicorn", "nicegui")
 """Packages without which there is no window."""
 LOCAL = ("127.0.0.1", "::1", "localhost")
 ANY = ("0.0.0.0", "::")
-TOKEN = 12
-"""Bytes of chance in a token."""
 
 
 def lacking() -> str:
@@ -82,7 +77,7 @@ def outward(host: str) -> str:
 
 def hosts(shown: Shown) -> "Hosts":
     """All that the page may be called: else a page of others could call it by a name of theirs."""
-    from engage_hri.services.console.web.guard import Hosts
+    from engage_hri.services.web.guard import Hosts
 
     return Hosts(names(shown), addresses=shown.host not in LOCAL)
 
@@ -104,10 +99,12 @@ async def served(
     pages: the address of each below the server's, and what is said before it. tell: gets a line for each.
     role: of whoever has the token. opens: show the first in the browser.
     """
+    from engage_hri.services.web.serving import serving
+
     keys = server_keys(shown.https, names(shown)) if shown.https else None
     async with AsyncExitStack() as stack:
         try:
-            port = await stack.enter_async_context(web().serving(app, shown.host, shown.port, keys))
+            port = await stack.enter_async_context(serving(app, shown.host, shown.port, keys))
         except OSError as error:
             is_taken = error.errno == errno.EADDRINUSE
             free = "is another window there? --port 0 takes any that is free"
@@ -175,27 +172,7 @@ def windowed(
 
 def token_of(shown: Shown) -> str:
     """The token of the address: that in `--token-file`, or else a new one."""
-    return secrets.token_urlsafe(TOKEN) if shown.token_file is None else kept_token(shown.token_file)
-
-
-def kept_token(path: Path) -> str:
-    """The token in a file, which is made for its owner alone if there is none. Raises InputRefused.
-
-    On the command line, every user of the machine could read it.
-    """
-    try:
-        with suppress(FileExistsError), open(path, "x", opener=partial(os.open, mode=0o600)) as file:
-            file.write(f"{secrets.token_urlsafe(TOKEN)}\n")
-        token, mode = path.read_text(encoding="utf-8").strip(), path.stat().st_mode
-    except (OSError, UnicodeDecodeError) as error:
-        reason = f"cannot be read or made: {getattr(error, 'strerror', None) or error}"
-        raise InputRefused(Fault(reason=reason, where=str(path))) from error
-    if os.name == "posix" and mode & 0o077:
-        raise InputRefused(Fault(reason="others may read it", where=str(path), advice=f"chmod 600 {path}"))
-    if not re.fullmatch(r"[\w-]{12,}", token, re.ASCII):
-        reason = "this is no token: at least 12 letters, digits, - and _, on one line"
-        raise InputRefused(Fault(reason=reason, where=str(path), advice="name a new file, and it is made"))
-    return token
+    return new_token() if shown.token_file is None else kept_token(shown.token_file)
 
 
 def workshop_page(token: str) -> str:

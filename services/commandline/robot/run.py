@@ -21,7 +21,7 @@ from engage_hri.services.commandline.shell.process import (
     unique_name,
     until_closed,
 )
-from engage_hri.services.commandline.shell.roster import ROBOT, SENSES, complete
+from engage_hri.services.commandline.shell.roster import DOOR, ROBOT, SENSES, complete
 from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.runtime.service import Service, running
 
@@ -74,7 +74,7 @@ def main(options: Options) -> int:
         raise InputRefused(Fault(reason="--task is for pieces", advice="engage run pieces --task FILE"))
     if options.attended:
         end_after_the_parent()
-    on_robot = {*names} <= {*ROBOT, *SENSES}
+    on_robot = {*names} <= {*ROBOT, *SENSES, DOOR}
     config = options.load() if on_robot else options.read(complete())
     run_until_signal(_serve(options, names, config))
     return DONE

@@ -23,9 +23,11 @@ TASK = "collaboration"
 """Service that ends by itself, with the task."""
 SENSES = ("hearing", "eyes", "pieces")
 """Services that find out what people do from sensors; a robot may do without."""
+DOOR = "door"
+"""Service that lets programs in any language drive the robot."""
 PLAY = (*ROBOT, *ELSEWHERE)
 """A robot with simulated people and their task: nothing of it needs a device."""
-NAMES = (*ROBOT, *SENSES, *ELSEWHERE)
+NAMES = (*ROBOT, *SENSES, DOOR, *ELSEWHERE)
 FUNCTIONS = {"generation": "generate", "realizer": "realize", "recognition": "recognize", "control": "embody"}
 """Coroutine function in the `service.py` of each service of a robot."""
 

@@ -6,6 +6,7 @@ from engage_hri.schemas.units import Seconds, not_negative
 from engage_hri.schemas.world import COVERED_FOR
 from engage_hri.services.bus.config import BusConfig
 from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.door.config import DoorConfig
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.perception.eyes.config import EyesConfig
 from engage_hri.services.perception.hearing.config import PAGE, HearingConfig
@@ -41,6 +42,7 @@ class RobotConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     hearing: HearingConfig = HearingConfig()
     eyes: EyesConfig = EyesConfig()
     pieces: PiecesConfig = PiecesConfig()
+    door: DoorConfig = DoorConfig()
 
     def __post_init__(self) -> None:
         not_negative(self, ("covered_for",))

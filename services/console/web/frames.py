@@ -1,4 +1,4 @@
-"""Frames, receipts and messages: what a page or a program gets next. Pure.
+"""Frames and receipts: what a page gets next. Pure.
 
 A frame is all that has changed since the last one that a browser drew.
 
@@ -6,19 +6,14 @@ A receipt is what the window and one of its pages know of the page's orders, whi
 page numbers its orders as it sends them: 1, 2, 3... The window takes each number once, and none before the one that
 precedes it, and tells which it took last. So a page whose link was cut learns from the first frame of the next one
 which orders arrived, and sends exactly the others. News of orders are told again until a frame with them was drawn.
-
-A program gets messages as JSON: the newest of them, if it is slow.
 """
 
 from collections import deque
-from collections.abc import Collection
 from typing import Protocol
 
-import msgspec
 from msgspec import Raw, Struct
 from msgspec.json import Encoder
 
-from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.web.orders import Panel
 
@@ -196,37 +191,3 @@ class Viewer:
         sections = {name: Raw(picture.section(name)) for name in new}
         news, self._you = (you if you != self._you else None), you
         return self._encoder.encode(PageFrame(picture.zero(now), sections, gone, session, taken, news, told, place))
-
-
-MESSAGES_KEPT = 1000
-"""Number of messages that wait; the oldest are dropped for those that come after."""
-
-
-class Outbox:
-    """Messages for one program. only: their types, such as `connection_event`; empty: all."""
-
-    def __init__(self, only: Collection[str] = ()) -> None:
-        self._only = frozenset(only)
-        self._waiting: deque[str] = deque()
-        self._dropped = 0
-
-    def put(self, message: Message) -> bool:
-        """Take a message. Returns True if it now waits for the program."""
-        if self._only and message.__struct_config__.tag not in self._only:
-            return False
-        if len(self._waiting) == MESSAGES_KEPT:
-            self._waiting.popleft()
-            self._dropped += 1
-        self._waiting.append(msgspec.json.encode(message).decode())
-        return True
-
-    def take(self) -> list[str]:
-        """Give out what waits, in order. If some were dropped, their number comes first."""
-        taken, self._waiting = [*self._waiting], deque()
-        dropped, self._dropped = self._dropped, 0
-        return [msgspec.json.encode({"type": "dropped", "count": dropped}).decode(), *taken] if dropped else taken
-
-
-def message_types() -> frozenset[str]:
-    """All types that a message may have."""
-    return frozenset(kind.__struct_config__.tag for kind in Message.__args__)

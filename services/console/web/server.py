@@ -4,10 +4,8 @@ import asyncio
 import contextlib
 import json
 import re
-import secrets
-import socket
 from base64 import b64encode
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Sequence
 from hashlib import sha256
 from html import escape
 from importlib.util import find_spec
@@ -15,7 +13,6 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
 
-import uvicorn
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, RedirectResponse, Response
@@ -28,8 +25,7 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.web import orders
-from engage_hri.services.console.web.frames import Outbox, Receipts, Viewer, You, message_types
-from engage_hri.services.console.web.guard import App, Guarded, Hosts
+from engage_hri.services.console.web.frames import Receipts, Viewer, You
 from engage_hri.services.console.web.played import PlayedPicture
 from engage_hri.services.console.web.service import WindowServer
 from engage_hri.services.console.web.sessions import OVER, PageSession, Sessions
@@ -38,11 +34,13 @@ from engage_hri.services.console.web.sounds import Sounds
 from engage_hri.services.console.web.stage import StageFace
 from engage_hri.services.console.web.visitor import Visitor
 from engage_hri.services.recording.reading import Recording
+from engage_hri.services.web.guard import App, Guarded, Hosts
+from engage_hri.services.web.links import sent, text_of
+from engage_hri.services.web.outbox import Outbox, message_types
+from engage_hri.services.web.tokens import is_token
 
 TICK: Seconds = 1 / 15
 """Least time between two frames of a browser."""
-LARGEST_ORDER = 2**16
-"""Bytes of one order of a page."""
 MOST_VIEWERS = 100
 FULL = 4429
 """Code with which a WebSocket is closed for which there is no room: 4000 and the status that HTTP has for it."""
@@ -70,8 +68,6 @@ POLICY = (
     "frame-ancestors 'self'"
 )
 """What our own page may load and do. imports: digest of its map of modules, the only script in the page itself."""
-NO_TEXT = 1003
-"""Code of RFC 6455 with which a WebSocket is closed that sends bytes."""
 
 
 def application(
@@ -100,7 +96,7 @@ def application(
             given = browser.query_params.get("token", browser.cookies.get(_cookie(token), ""))
             window.viewers += 1
             try:
-                await _shown(browser, sessions, _is(given, token))
+                await _shown(browser, sessions, is_token(given, token))
             finally:
                 window.viewers -= 1
 
@@ -148,10 +144,6 @@ def stage_token(token: str) -> str:
 def _cookie(token: str) -> str:
     """Name of the cookie that holds a token: windows at all ports of a host share their cookies."""
     return f"engage-{sha256(token.encode()).hexdigest()[:12]}"
-
-
-def _is(given: str, token: str) -> bool:
-    return secrets.compare_digest(given.encode(), token.encode())
 
 
 def recorded(recording: Recording, hosts: Hosts) -> App:
@@ -222,7 +214,7 @@ def _page(
             return HTMLResponse(page, headers=headers)
         rest = f"?{urlencode(asked)}" if asked else ""
         response = RedirectResponse(f"./{request.url.path.rpartition('/')[2]}{rest}", 303)
-        if _is(given, token):
+        if is_token(given, token):
             safe = request.url.scheme == "https"
             # path: that of the page
             response.set_cookie(_cookie(token), token, path=None, httponly=True, samesite="strict", secure=safe)
@@ -238,18 +230,6 @@ class _Fresh(StaticFiles):
         response = super().file_response(*args, **more)
         response.headers["cache-control"] = "no-cache"
         return response
-
-
-async def _text(socket: WebSocket) -> str:
-    """Wait for a text. Raises WebSocketDisconnect when the other side has gone, or sends something else."""
-    message = await socket.receive()
-    if message["type"] == "websocket.disconnect":
-        raise WebSocketDisconnect(message["code"])
-    text = message.get("text")
-    if text is None:
-        await socket.close(NO_TEXT, "send text, not bytes")
-        raise WebSocketDisconnect(NO_TEXT)
-    return str(text)
 
 
 async def _shown(browser: WebSocket, sessions: Sessions, trusted: bool) -> None:
@@ -275,7 +255,7 @@ async def _show(browser: WebSocket, session: PageSession) -> None:
     async def listen() -> None:
         while not receipts.is_full:
             try:
-                said = orders.message(await _text(browser))
+                said = orders.message(await text_of(browser))
             except InputRefused as error:
                 receipts.tell("part", str(error))
                 continue
@@ -342,80 +322,8 @@ async def _tell(window: WindowServer, program: WebSocket, outbox: Outbox) -> Non
         if outbox.put(message):
             news.set()
 
-    async def listen() -> None:
-        while True:  # what it says means nothing
-            await _text(program)
-
     window.listeners.add(take)
-    listening = asyncio.create_task(listen(), name="program")
     try:
-        while not listening.done():
-            waiting = asyncio.ensure_future(news.wait())
-            await asyncio.wait((waiting, listening), return_when=asyncio.FIRST_COMPLETED)
-            waiting.cancel()
-            news.clear()
-            for text in outbox.take():
-                await program.send_text(text)
-        listening.result()
+        await sent(program, outbox, news)
     finally:
         window.listeners.discard(take)
-        listening.cancel()
-
-
-class _Quiet(uvicorn.Server):
-    """The server without its own ways with signals: the process has its own. stands: set when it serves."""
-
-    def __init__(self, config: uvicorn.Config) -> None:
-        super().__init__(config)
-        self.stands = asyncio.Event()
-
-    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        await super().startup(sockets)
-        self.stands.set()
-
-    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Wait for no connection, but let the application end in order: its task would be left behind."""
-        await super().shutdown(sockets)
-        if self.force_exit:
-            await self.lifespan.shutdown()
-
-    @contextlib.contextmanager
-    def capture_signals(self) -> Iterator[None]:
-        yield
-
-
-@contextlib.asynccontextmanager
-async def serving(app: App, host: str, port: int, keys: tuple[Path, Path] | None = None) -> AsyncIterator[int]:
-    """Serve while the body of `async with` runs. port: 0: any that is free. Returns the port.
-
-    keys: files of a certificate and of its private key, to speak TLS. Raises OSError if the port is taken.
-    """
-    certificate, private = keys or (None, None)
-    # With a configuration of its own for the log, it would close the handlers of ours.
-    config = uvicorn.Config(
-        app, log_config=None, log_level="warning", access_log=False, lifespan="on", timeout_graceful_shutdown=1,
-        ws="websockets-sansio", ws_per_message_deflate=False, ws_max_size=LARGEST_ORDER,
-        ssl_certfile=certificate, ssl_keyfile=private,
-    )  # fmt: skip
-    listening = _bound(host, port)
-    server = _Quiet(config)
-    running = asyncio.create_task(server.serve(sockets=[listening]), name="web server")
-    try:
-        standing = asyncio.create_task(server.stands.wait())
-        await asyncio.wait((standing, running), return_when=asyncio.FIRST_COMPLETED)
-        standing.cancel()
-        if running.done():
-            running.result()
-        yield listening.getsockname()[1]
-    finally:
-        server.should_exit = True
-        server.force_exit = True
-        await asyncio.wait([running])
-        if server.stands.is_set():  # an end by force leaves this out, and the loop then ends it by a traceback
-            await server.lifespan.shutdown()
-
-
-def _bound(host: str, port: int) -> socket.socket:
-    """A socket that listens there. Raises OSError if it cannot."""
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    return socket.create_server((host, port), family=family)

@@ -11,8 +11,6 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.bus.keyring import CERTIFICATE, PRIVATE
 from engage_hri.services.runtime.installation import extra_command
 
-OPTION = "--https"
-
 
 class ServerKeys(NamedTuple):
     """Files of a server. certificate: with those that vouch for it. private: its key; may be in the same file."""
@@ -41,7 +39,7 @@ def server_keys(path: Path, hosts: Iterable[str]) -> ServerKeys:
     except OSError as error:  # of ssl, too
         advice = "a PEM file with a certificate and its key without a password, or the folder of a router's keys"
         reason = f"no certificate with its key: {error.strerror or error}"
-        raise InputRefused(Fault(reason=reason, where=f"{OPTION} {path}", advice=advice)) from error
+        raise InputRefused(Fault(reason=reason, where=str(path), advice=advice)) from error
     return found
 
 
@@ -49,7 +47,7 @@ def _make(path: Path, hosts: Iterable[str]) -> None:
     if find_spec("cryptography") is None:
         advice = f"{extra_command('keys')}; or name a file with a certificate and its key"
         reason = "there is no such file, and none can be made without the package `cryptography`"
-        raise InputRefused(Fault(reason=reason, where=f"{OPTION} {path}", advice=advice))
+        raise InputRefused(Fault(reason=reason, where=str(path), advice=advice))
     from engage_hri.services.bus.certificates import write_own
 
     write_own(path, hosts)
