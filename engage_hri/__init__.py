@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from engage_hri.services.client.language_models import stream as stream
     from engage_hri.services.client.people.perceive import perceive as perceive
     from engage_hri.services.client.people.perceived_person import PerceivedPerson as PerceivedPerson
-    from engage_hri.services.client.robot import PerformFailed as PerformFailed
+    from engage_hri.services.client.performing import PerformFailed as PerformFailed
     from engage_hri.services.client.robot import Robot as Robot
     from engage_hri.services.client.robot import connect as connect
     from engage_hri.services.commandline.embedding import embedded as embedded
@@ -77,7 +77,8 @@ _PLACES = {
     "engage_hri.schemas.world": ("Entity", "World"),
     "engage_hri.services.client.people.perceive": ("perceive",),
     "engage_hri.services.client.people.perceived_person": ("PerceivedPerson",),
-    "engage_hri.services.client.robot": ("PerformFailed", "Robot", "connect"),
+    "engage_hri.services.client.performing": ("PerformFailed",),
+    "engage_hri.services.client.robot": ("Robot", "connect"),
     "engage_hri.services.commandline.embedding": ("embedded",),
     "engage_hri.services.control.contract.body": (
         "Arrived",

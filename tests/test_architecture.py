@@ -68,7 +68,8 @@ LAYERS = {
     "services/perception/hearing": "service > device pages > intake > speeches"
     " > company listening microphone own_voice recognizers > recognizing sound > voice > config",
     "services/commandline": "look robot study talk > app bodies embedding > shell",
-    "services/client": "language_models > robot > orders > feeds people > chunking event_stream inputs",
+    "services/client": "conversation > language_models > robot > heard turn > known_objects outcomes > performing"
+    " > orders > feeds people > chunking event_stream inputs turn_ends",
     "services/generation": "service > intake > fragments > performance > acts > fragment_check pipeline"
     " > block exchange head > references turns > inhibitions > config",
     "services/realizer": "service > perform > export together > report > decide > foresee > plan > net"
