@@ -33,7 +33,8 @@ PURE_MACHINERY = {
     "services/runtime/again.py", "services/runtime/installation.py",
     "services/runtime/intake.py", "services/runtime/parcels.py",
     "services/runtime/steps.py",
-    "services/client/chunking.py", "services/client/event_stream.py", "services/client/people/actions.py",
+    "services/client/chunking.py", "services/client/event_stream.py", "services/client/turn_ends.py",
+    "services/client/people/actions.py",
     "services/client/people/shared_world.py", "services/bus/deadlines.py", "services/bus/samples.py",
 }  # fmt: skip
 """Files of these packages that are pure themselves."""

@@ -21,7 +21,7 @@ from engage_hri.services.client.chunking import Chunker
 from engage_hri.services.client.inputs import call_in, shown, taken
 from engage_hri.services.client.outcomes import outcome_of, unreadable
 from engage_hri.services.client.robot import Robot
-from engage_hri.services.client.turn import Piece, Turn
+from engage_hri.services.client.turn import Piece, RobotTurn
 
 PLAIN_TURN = ToolInput(turn_status="full", parts=())
 
@@ -82,7 +82,7 @@ async def stream(
         raise InputRefused(
             Fault(reason=f"{shown(turn)} is no ToolInput", where=f"{id}: turn", advice=f"for example {PLAIN_TURN!r}")
         )
-    async with Turn(robot, id, turn, chunker, await_answer=await_answer) as speaking:
+    async with RobotTurn(robot, id, turn, chunker, await_answer=await_answer) as speaking:
         async for piece in pieces:
             await speaking.write(piece)
     return speaking.outcomes

@@ -1,4 +1,4 @@
-"""What a client asks a robot to perform: fragments of turns, and blocks past the policies."""
+"""Requests of a client that a robot performs: fragments of turns, and blocks past the policies."""
 
 from collections.abc import Iterable
 from typing import TypeVar

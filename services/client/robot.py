@@ -16,7 +16,7 @@ from typing import Literal, get_args
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import EventKind
 from engage_hri.schemas.blocks import Feedback, Held
-from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import HeadOwner, TurnClosed
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, Utterance
 from engage_hri.schemas.recognition import Floor, Interjection, Statistics
@@ -27,10 +27,13 @@ from engage_hri.services.bus.config import Mode
 from engage_hri.services.bus.interface import Hub, Keep
 from engage_hri.services.client.event_stream import EventStream
 from engage_hri.services.client.feeds import ActionFeed, EventFeed, Feed, LevelFeed, NewFeed, WorldFeed, first_of
+from engage_hri.services.client.heard import HeardFeed
 from engage_hri.services.client.inputs import listed, shown, taken
 from engage_hri.services.client.performing import PerformingRobot
-from engage_hri.services.client.turn import Turn
+from engage_hri.services.client.turn import RobotTurn
+from engage_hri.services.client.turn_ends import EndOfTurn
 from engage_hri.services.runtime.configuration import bus_config
+from engage_hri.services.runtime.installation import TURN_ENDS, offers
 
 
 class Robot(PerformingRobot):
@@ -48,7 +51,7 @@ class Robot(PerformingRobot):
         interruptible: bool | str | tuple[str, ...] = "",
         interruptible_after: Literal[0, 1, 2, 4] = 0,
         thinking: bool = False,
-    ) -> Turn:
+    ) -> RobotTurn:
         """Make a turn of the robot, for `async with`. What it says answers those who wait for an answer.
 
         to: ids of those spoken to, or `*` for all; empty: the only one there.
@@ -66,7 +69,21 @@ class Robot(PerformingRobot):
             interruptible_after=interruptible_after,
             thinking=thinking,
         )
-        return Turn(self, id or self._unnamed(), whole)
+        return RobotTurn(self, id or self._unnamed(), whole)
+
+    def heard(self, *, language: str = "", ends: EndOfTurn | str = "") -> HeardFeed:
+        """Follow the turns of people: each as soon as it begins, with its words as they come, until it is over.
+
+        language: of the words, as `en-GB`, by which an unfinished sentence is known; empty: any.
+        ends: what decides that a turn is over: an object of yours, or the name of one that an installed package
+            offers (`engage.turn_ends`); empty: the rule of `EndOfTurn`.
+
+        Raises:
+            InputRefused: no package offers that, or it cannot be had.
+        """
+        taken(language, str, "language")
+        self._requests.check()
+        return HeardFeed(self._bus, _end_of_turn(ends), language)
 
     def connection_events(
         self, actor: str = "", kind: EventKind | Collection[EventKind] = (), *, open: bool = False
@@ -199,6 +216,24 @@ class Robot(PerformingRobot):
     def utterances(self) -> Feed[Utterance]:
         """Follow the words of people: partial results, final ones, corrections, as perception tells them."""
         return self._feed((Utterance,), keys.UTTERANCE)
+
+
+def _end_of_turn(named: EndOfTurn | str) -> EndOfTurn:
+    """Find what decides that a turn is over. Raises InputRefused."""
+    if not isinstance(named, str):
+        return named
+    if not named:
+        return EndOfTurn()
+    found = {each.name: each for each in offers(TURN_ENDS)}
+    if (offer := found.get(named)) is None:
+        advice = f"there are {', '.join(sorted(found)) or 'none'}: `{TURN_ENDS}` among the entry points of a package"
+        raise InputRefused(Fault(reason=f"no package offers {named!r}", where="ends", advice=advice))
+    try:
+        made: EndOfTurn = offer.load()()
+    except Exception as error:
+        reason = f"{offer.package} offers {named!r}, which cannot be had: {error}"
+        raise InputRefused(Fault(reason=reason, where="ends", advice=offer.advice(error))) from error
+    return made
 
 
 @asynccontextmanager

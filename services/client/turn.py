@@ -53,7 +53,7 @@ ANSWER_WITHIN: Seconds = 6.0
 T = TypeVar("T")
 
 
-class Answer(Struct, frozen=True, kw_only=True, omit_defaults=True):
+class TurnAnswer(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The answer to a turn. action: what answered it. by: id of the person who did.
 
     delay: seconds from the end of the turn; below 0 if it began before that.
@@ -78,7 +78,7 @@ class Sent(Generic[T]):
         return self._result()
 
 
-class Turn:
+class RobotTurn:
     """A turn of the robot. Made by `Robot.turn`, used by `async with`; all its methods are for the time in between.
 
     What is said and shown goes on while the body does other things; who wants to know when it is done awaits it. At
@@ -158,7 +158,9 @@ class Turn:
         part = Refer(refer=object, certainty=certainty, phrases=tuple(phrases))
         return self._whole([part], "middle", lambda outcome: next((each.looked for each in outcome.references), None))
 
-    def ask(self, *pieces: Piece, within: Seconds = ANSWER_WITHIN, expects: Expects = "reply") -> Sent[Answer | None]:
+    def ask(
+        self, *pieces: Piece, within: Seconds = ANSWER_WITHIN, expects: Expects = "reply"
+    ) -> Sent[TurnAnswer | None]:
         """Say the last words of the turn, and hand over; to await: the answer, or None if none has come in time.
 
         pieces: as of `say`.
@@ -268,12 +270,12 @@ class Turn:
 
     @property
     def status(self) -> Literal["", "done", "interrupted", "failed", "unknown", "refused"]:
-        """How it ended, as in `Summary`; empty: it goes on."""
+        """Status at its end, as in `Summary`; empty: it goes on."""
         return self.summary.status if self._is_over else ""
 
     @property
     def references(self) -> tuple[ReferenceMade, ...]:
-        """How each reference was made, and whether they have looked."""
+        """References as they were made, and whether they have looked."""
         return tuple(made for outcome in self.outcomes for made in outcome.references)
 
     @property
@@ -283,8 +285,8 @@ class Turn:
         return tuple(sorted(events.values(), key=lambda each: each.started.seconds))
 
     @property
-    def answer(self) -> Answer | None:
-        """What answered the turn; None: nothing so far, or it asked for nothing."""
+    def answer(self) -> TurnAnswer | None:
+        """Answer to the turn; None: nothing so far, or it asked for nothing."""
         pairs = [each for each in self.events if each.kind == "adjacency_pair" and each.response]
         if not pairs:
             return None
@@ -292,7 +294,7 @@ class Turn:
         by = pair.answered_by or pair.responder
         texts = {(each.id, each.began): each.text for it in self.outcomes for each in it.heard if each.actor == by}
         assert pair.response
-        return Answer(action=pair.response, by=by, delay=pair.delay or 0.0, text=" ".join(texts.values()))
+        return TurnAnswer(action=pair.response, by=by, delay=pair.delay or 0.0, text=" ".join(texts.values()))
 
     # -- its beginning and its end ------------------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ import pytest
 from engage_hri import PerceivedPerson, embedded, perceive
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.tool import Gesture
-from engage_hri.services.client.turn import Answer, Turn
+from engage_hri.services.client.turn import RobotTurn, TurnAnswer
 from engage_hri.services.commandline.embedding import EmbeddedRobot
 
 LONG = "One two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen."
@@ -68,7 +68,7 @@ async def test_words_are_told_as_they_are_spoken() -> None:
     async with with_ann() as (robot, _):
         times: list[tuple[str, float]] = []
 
-        async def follow(turn: Turn) -> None:
+        async def follow(turn: RobotTurn) -> None:
             async for word in turn.words():
                 times.append((word, robot.now()))
 
@@ -108,7 +108,7 @@ async def test_who_takes_the_floor_ends_the_body_where_it_waits() -> None:
 @pytest.mark.parametrize("way", ["cancelled", "timeout", "error"])
 @pytest.mark.parametrize("after", [0.0, 0.3, 1.234, 2.0])
 async def test_a_body_that_is_left_stops_the_robot_at_a_word_and_said_is_true(way: str, after: float) -> None:
-    turns: list[Turn] = []
+    turns: list[RobotTurn] = []
 
     async def speak(robot: EmbeddedRobot) -> None:
         async with robot.turn(id="t") as turn:
@@ -163,7 +163,7 @@ async def test_a_turn_that_is_held_waits_between_two_words_and_goes_on() -> None
     assert turn.said == f"{LONG} The end."
 
 
-async def stop_later(turn: Turn) -> None:
+async def stop_later(turn: RobotTurn) -> None:
     await asyncio.sleep(1.0)
     await turn.stop()
 
@@ -204,5 +204,5 @@ async def test_a_turn_of_no_words_is_none_and_one_that_has_asked_says_no_more() 
             await ann.nod()
             answer = await asked
 
-    assert answer == Answer(action="nod", by="ann", delay=answer.delay if answer else 0.0)
+    assert answer == TurnAnswer(action="nod", by="ann", delay=answer.delay if answer else 0.0)
     assert (nothing.said, nothing.outcomes, nothing.status) == ("", (), "done")
