@@ -282,7 +282,7 @@ class HeardFeed(Reading[HeardTurn]):
         if turn._speaks:
             return inf
         is_waited_for = any(not each.final for each in turn._utterances.values()) or (
-            not turn._utterances and turn.who in self._worded
+            turn._reading == "open" or (not turn._utterances and turn.who in self._worded)
         )
         so_far = SoFar(
             who=turn.who,

@@ -51,6 +51,16 @@ STOP_PATIENCE: Seconds = 3.0
 ANSWER_WITHIN: Seconds = 6.0
 """Time for the answer to a question, as recognition has it for a reply."""
 T = TypeVar("T")
+Change = Callable[[TurnFragment], TurnFragment]
+
+
+def _unchanged(fragment: TurnFragment) -> TurnFragment:
+    return fragment
+
+
+def _asking(within: Seconds, expects: Expects) -> Change:
+    """Make a fragment the question of its turn."""
+    return lambda fragment: replace(fragment, turn_index=1, within=within, accept=ANSWERS[expects])
 
 
 class TurnAnswer(Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -101,7 +111,8 @@ class RobotTurn:
         self._robot = robot
         self._turn = turn
         self._chunker = chunker or Chunker()
-        self._await_answer = await_answer
+        self._is_awaited = await_answer
+        self._question: Change = _unchanged
         self._fragments: list[TurnFragment] = []
         self._performing: list[asyncio.Task[FragmentOutcome]] = []
         self._sent: dict[str, Pending] = {}
@@ -110,6 +121,8 @@ class RobotTurn:
         """Words as they are spoken."""
         self._live: dict[str, list[str]] = {}
         """Those of each fragment."""
+        self._first: dict[str, Seconds] = {}
+        """When the first word of each fragment was over."""
         self._news = asyncio.Event()
         """Set when there is another word, or the turn is over."""
         self._line = asyncio.Lock()
@@ -170,12 +183,15 @@ class RobotTurn:
         Raises:
             InputRefused: the turn has ended, has not begun, or a piece is neither text nor a part.
         """
-        return self._whole(
-            pieces,
-            "end",
-            lambda outcome: self.answer,
-            lambda fragment: replace(fragment, turn_index=1, within=within, accept=ANSWERS[expects]),
-        )
+        self._is_awaited = True
+        return self._whole(pieces, "end", lambda outcome: self.answer, _asking(within, expects))
+
+    def expect_answer(self, within: Seconds = ANSWER_WITHIN, expects: Expects = "reply") -> None:
+        """Let what was written end as a question: an answer opens there, and nobody waits for it here.
+
+        within: seconds that the answer may take. expects: does moving a thing answer it?
+        """
+        self._question = _asking(within, expects)
 
     async def write(self, piece: Piece) -> None:
         """Take a bit of what is being written: each clause is said as soon as it is complete.
@@ -249,14 +265,33 @@ class RobotTurn:
     @property
     def said(self) -> str:
         """The words that were really spoken, so far."""
-        return joined(text for fragment in self._fragments for text in self._said_of(fragment))
+        return self.said_between(0)
 
     @property
     def unsaid(self) -> str:
         """The words that were to be spoken and were not; an object in brackets where its phrase was not said."""
+        return self.unsaid_between(0)
+
+    @property
+    def mark(self) -> int:
+        """A place in the turn: behind all that was sent so far, for `said_between` and its like."""
+        return len(self._fragments)
+
+    def said_between(self, first: int, last: int | None = None) -> str:
+        """Return the words that were really spoken between two marks. last: None: up to the end."""
+        return joined(text for fragment in self._fragments[first:last] for text in self._said_of(fragment))
+
+    def unsaid_between(self, first: int, last: int | None = None) -> str:
+        """Return the words between two marks that were not spoken. last: None: up to the end."""
         outcomes = {each.fragment: each for each in self.outcomes} if self._is_over else {}
-        left = [words for each in self._fragments for words in unsaid(each, outcomes.get(each.id))]
-        return joined([*left, *texts(self._rest)])
+        left = [words for each in self._fragments[first:last] for words in unsaid(each, outcomes.get(each.id))]
+        return joined([*left, *(texts(self._rest) if last is None else ())])
+
+    def began_between(self, first: int, last: int | None = None) -> Seconds | None:
+        """Return the time at which the first word between two marks was over; None: there is none."""
+        return min(
+            (self._first[each.id] for each in self._fragments[first:last] if each.id in self._first), default=None
+        )
 
     @property
     def outcomes(self) -> tuple[FragmentOutcome, ...]:
@@ -338,7 +373,7 @@ class RobotTurn:
         self._left_out += self._chunker.left_out
         # Where nobody has written anything there is no turn.
         if not self._is_finished and (self._fragments or chunk or self._left_out):
-            self._send(chunk, "end")
+            self._send(chunk, "end", self._question)
 
     async def _all_performed(self) -> None:
         """Wait for all outcomes, and leave no turn open: a fragment that was refused may have been to end it."""
@@ -414,7 +449,7 @@ class RobotTurn:
         pieces: Iterable[Piece],
         status: TurnStatus,
         result: Callable[[FragmentOutcome], T],
-        change: Callable[[TurnFragment], TurnFragment] = lambda fragment: fragment,
+        change: Change = _unchanged,
     ) -> Sent[T]:
         """Send what was written before and these pieces, complete, as one fragment."""
         ids, parts = self._objects.known, []
@@ -458,7 +493,7 @@ class RobotTurn:
         self,
         chunk: Chunk,
         status: TurnStatus,
-        change: Callable[[TurnFragment], TurnFragment] = lambda fragment: fragment,
+        change: Change = _unchanged,
     ) -> "asyncio.Task[FragmentOutcome]":
         self._is_finished = status == "end"
         if not self._fragments:
@@ -486,8 +521,7 @@ class RobotTurn:
             except EngageError:
                 self._is_broken = True
         try:
-            awaits = self._await_answer or (fragment.within is not None and fragment.turn_status in ("end", "full"))
-            outcome = await self._robot._end_of(pending, await_answer=awaits)
+            outcome = await self._robot._end_of(pending, await_answer=self._is_awaited)
         except EngageError as error:
             outcome = outcome_of(error, fragment.id, fragment.worded)
         if outcome.status != "done":
@@ -544,6 +578,7 @@ class RobotTurn:
         if word.block in self._sent and word.word:
             self._words.append(word.word)
             self._live.setdefault(word.block, []).append(word.word)
+            self._first.setdefault(word.block, self._robot.local(word.at))
             self._news.set()
 
     def _lose(self) -> None:
