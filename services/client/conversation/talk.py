@@ -342,4 +342,5 @@ class Conversation:
         self._news.set()
 
     def _complain(self, error: EngageError) -> None:
+        self._robot._bus.log.warning("the conversation: %s", error.fault)
         self.problems = [*self.problems, str(error.fault)][-100:]

@@ -131,7 +131,7 @@ async def converse(seed: int) -> tuple[list[str], int]:
                 await asyncio.sleep(chance.choice((0.2, 1.0, 2.0, 4.0, 9.0)))
                 if chance.random() < 0.2:
                     await ann.type(chance.choice(SAYS))
-            await asyncio.sleep(45.0)
+            await asyncio.sleep(30.0)
         found = differences(talk.history, listener.words())
         await bus.leave()
     cut = sum(not isinstance(each, PersonSaid) and each.is_cut for each in talk.history)
