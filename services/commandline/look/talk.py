@@ -63,7 +63,7 @@ class Options(Written, Embodied, Hearing, Shown):
         str | None,
         typer.Option(
             metavar="MODEL",
-            help="A model leads the talk in place of rules: openai:NAME, anthropic:NAME or ollama:NAME, with @ADDRESS "
+            help="A model leads the talk in place of rules: openai:NAME, anthropic:NAME, ollama:NAME, with @ADDRESS "
             "of another server; or http://HOST:PORT/v1#NAME. Its key is in OPENAI_API_KEY, ANTHROPIC_API_KEY, or for "
             "another server in ENGAGE_MODEL_KEY.",
             show_default=False,
