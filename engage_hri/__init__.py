@@ -46,13 +46,21 @@ if TYPE_CHECKING:
     from engage_hri.schemas.tool import tool_definition as tool_definition
     from engage_hri.schemas.world import Entity as Entity
     from engage_hri.schemas.world import World as World
+    from engage_hri.services.client.conversation.history import PersonSaid as PersonSaid
+    from engage_hri.services.client.conversation.history import RobotSaid as RobotSaid
+    from engage_hri.services.client.conversation.talk import Conversation as Conversation
+    from engage_hri.services.client.conversation.tools import McpServer as McpServer
+    from engage_hri.services.client.heard import HeardTurn as HeardTurn
     from engage_hri.services.client.language_models import perform_call as perform_call
     from engage_hri.services.client.language_models import stream as stream
     from engage_hri.services.client.people.perceive import perceive as perceive
     from engage_hri.services.client.people.perceived_person import PerceivedPerson as PerceivedPerson
-    from engage_hri.services.client.robot import PerformFailed as PerformFailed
+    from engage_hri.services.client.performing import PerformFailed as PerformFailed
     from engage_hri.services.client.robot import Robot as Robot
     from engage_hri.services.client.robot import connect as connect
+    from engage_hri.services.client.turn import RobotTurn as RobotTurn
+    from engage_hri.services.client.turn import TurnAnswer as TurnAnswer
+    from engage_hri.services.client.turn_ends import EndOfTurn as EndOfTurn
     from engage_hri.services.commandline.embedding import embedded as embedded
     from engage_hri.services.control.bases.one_part_motion import OrdinaryBody as OrdinaryBody
     from engage_hri.services.control.bases.setpoints import SetPointBody as SetPointBody
@@ -75,9 +83,16 @@ _PLACES = {
     "engage_hri.schemas.summary": ("Summary", "summary"),
     "engage_hri.schemas.tool": ("tool_definition",),
     "engage_hri.schemas.world": ("Entity", "World"),
+    "engage_hri.services.client.conversation.history": ("PersonSaid", "RobotSaid"),
+    "engage_hri.services.client.conversation.talk": ("Conversation",),
+    "engage_hri.services.client.conversation.tools": ("McpServer",),
+    "engage_hri.services.client.heard": ("HeardTurn",),
     "engage_hri.services.client.people.perceive": ("perceive",),
     "engage_hri.services.client.people.perceived_person": ("PerceivedPerson",),
-    "engage_hri.services.client.robot": ("PerformFailed", "Robot", "connect"),
+    "engage_hri.services.client.performing": ("PerformFailed",),
+    "engage_hri.services.client.robot": ("Robot", "connect"),
+    "engage_hri.services.client.turn": ("RobotTurn", "TurnAnswer"),
+    "engage_hri.services.client.turn_ends": ("EndOfTurn",),
     "engage_hri.services.commandline.embedding": ("embedded",),
     "engage_hri.services.control.contract.body": (
         "Arrived",
@@ -99,6 +114,8 @@ __all__ = [
     "Block",
     "Body",
     "ConnectionEvent",
+    "Conversation",
+    "EndOfTurn",
     "EngageError",
     "Entity",
     "Fault",
@@ -107,19 +124,24 @@ __all__ = [
     "Gaze",
     "Head",
     "HeadPolicy",
+    "HeardTurn",
     "InputRefused",
     "Interjection",
     "JointLimit",
+    "McpServer",
     "MovementAuthority",
     "OrdinaryBody",
     "PerceivedPerson",
     "PerformFailed",
+    "PersonSaid",
     "Pointing",
     "Ray",
     "Reached",
     "Reference",
     "RequestRefused",
     "Robot",
+    "RobotSaid",
+    "RobotTurn",
     "RunFailed",
     "SetPointBody",
     "SimulatedServos",
@@ -127,6 +149,7 @@ __all__ = [
     "SpeechOption",
     "Statistics",
     "Summary",
+    "TurnAnswer",
     "TurnFragment",
     "Utterance",
     "World",

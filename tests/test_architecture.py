@@ -33,7 +33,8 @@ PURE_MACHINERY = {
     "services/runtime/again.py", "services/runtime/installation.py",
     "services/runtime/intake.py", "services/runtime/parcels.py",
     "services/runtime/steps.py",
-    "services/client/chunking.py", "services/client/event_stream.py", "services/client/people/actions.py",
+    "services/client/chunking.py", "services/client/event_stream.py", "services/client/turn_ends.py",
+    "services/client/people/actions.py",
     "services/client/people/shared_world.py", "services/bus/deadlines.py", "services/bus/samples.py",
 }  # fmt: skip
 """Files of these packages that are pure themselves."""
@@ -71,7 +72,8 @@ LAYERS = {
     "services/perception/hearing": "service > device pages > intake > speeches"
     " > company listening microphone own_voice recognizers > recognizing sound > voice > config",
     "services/commandline": "look robot study talk > app bodies embedding > shell",
-    "services/client": "language_models > robot > orders > feeds people > chunking event_stream inputs",
+    "services/client": "conversation > language_models > robot > heard turn > known_objects outcomes > performing"
+    " > orders > feeds people > chunking event_stream inputs turn_ends",
     "services/generation": "service > intake > fragments > performance > acts > fragment_check pipeline"
     " > block exchange head > references turns > inhibitions > config",
     "services/realizer": "service > perform > export together > report > decide > foresee > plan > net"

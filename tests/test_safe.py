@@ -15,7 +15,8 @@ from engage_hri.schemas.faults import Fault, RunFailed, ServerRestarted
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.messages import Message
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.robot import PerformFailed, Robot, connect
+from engage_hri.services.client.performing import PerformFailed
+from engage_hri.services.client.robot import Robot, connect
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.realizer.config import LEASE, RealizerConfig

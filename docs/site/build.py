@@ -30,6 +30,7 @@ CONTENTS = {
         "scenario",
         "study",
         "recordings",
+        "conversations",
         "language-models",
         "voice-frameworks",
     ),

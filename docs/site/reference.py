@@ -27,6 +27,8 @@ the bus, and stands on the page of [messages](messages.md).
 SECTIONS = {
     "Driving a robot": ("connect", "embedded", "Robot"),
     "What you give it": ("TurnFragment", "Reference", "SpeechOption", "Speech", "Gaze", "Pointing", "Head", "Block"),
+    "Turns": ("RobotTurn", "TurnAnswer", "HeardTurn", "EndOfTurn"),
+    "Conversations led by a model": ("Conversation", "McpServer", "PersonSaid", "RobotSaid"),
     "Telling of people": ("perceive", "PerceivedPerson", "Utterance"),
     "What comes back": (
         "FragmentOutcome", "ConnectionEvent", "Statistics", "Floor", "Interjection", "World", "Entity",
@@ -42,6 +44,15 @@ SECTIONS = {
     ),
 }  # fmt: skip
 BESIDE = {
+    "Turns": (
+        "services.client.turn.Sent", "services.client.heard.HeardFeed", "services.client.turn_ends.SoFar",
+    ),
+    "Conversations led by a model": (
+        "services.client.conversation.history.ToolCall", "services.client.conversation.models.Model",
+        "services.client.conversation.models.EndpointModel", "services.client.conversation.dialects.ToolForm",
+        "services.client.conversation.dialects.TextBit", "services.client.conversation.dialects.CallBit",
+        "services.client.conversation.dialects.Finished",
+    ),
     "Writing a policy of the head": ("services.generation.head.scene.HeadScene", "schemas.fragments.Claim"),
     "Driving a robot": ("services.client.feeds.Feed", "services.client.feeds.EventFeed"),
     "What comes back": ("schemas.blocks.BlockOutcome", "schemas.recognition.OpenEvents"),

@@ -95,7 +95,7 @@ def planning(
         chosen = yield from choice(tables, scene, motions, config, apart)
         yield ELEMENTS
     emitted = Emission(fragment, turn, chosen.choices, config, permits, chosen.hands, before, apart).plan()
-    return replace(emitted, warnings=(*in_vain(fragment), *made.warnings, *chosen.warnings, *emitted.warnings))
+    return replace(emitted, warnings=(*in_vain(fragment, turn), *made.warnings, *chosen.warnings, *emitted.warnings))
 
 
 def planned(planning: Planning, answers: Callable[[tuple[EstimateItem, ...]], Sequence[Estimate]]) -> FragmentPlan:

@@ -136,3 +136,39 @@ async def test_a_file_is_heard_and_answered_without_a_window(tmp_path: Path) -> 
     assert process.returncode == 0, errors.decode()
     assert told.index('visitor: "where is the blue square"') < told.index('robot: "the blue square"')
     assert "the stage" not in told
+
+
+TOOLS = """
+from asyncio import sleep
+async def weather(city: str) -> str:
+    \"\"\"Tell the weather.\"\"\"
+    return "sun"
+def _hidden(): ...
+"""
+
+
+def test_a_model_leads_it_with_the_functions_of_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "tools.py"
+    path.write_text(TOOLS, encoding="utf-8")
+
+    found = talk._tools(str(path))
+    assert [each.form.name for each in found] == ["weather"]  # type: ignore[union-attr]
+    server = talk._tools("python server.py")
+    assert [each.server for each in server] == [("python", "server.py")]  # type: ignore[union-attr]
+    manager = talk.led_by_model(talk.Options(model="ollama:m", tools=[str(path)]))
+    assert (manager.phrases, manager.examples) == ((), ())
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        (("--model", "gpt"), "names no model"),
+        (("--model", "ollama:m", "--manager", "mine.py"), "either --manager or --model"),
+        (("--model", "ollama:m", "--tools", "nowhere.py"), "cannot be run"),
+        (("--model", "ollama:m", "--prompt", "nowhere.txt"), "cannot be read"),
+    ],
+)
+def test_a_model_that_cannot_lead_is_refused(engage: Engage, wrong: tuple[str, ...], told: str) -> None:
+    refused = engage("talk", *wrong)
+
+    assert (refused.code, told in refused.err) == (2, True)

@@ -33,7 +33,8 @@ from engage_hri.schemas.units import Stamp
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.client.robot import ANSWER_PATIENCE, PerformFailed, connect
+from engage_hri.services.client.performing import ANSWER_PATIENCE, PerformFailed
+from engage_hri.services.client.robot import connect
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.service import Ready, running
 

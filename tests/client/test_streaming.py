@@ -39,6 +39,8 @@ class Generation:
         self.heard: list[tuple[float, TurnFragment]] = []
         self.cancelled: list[str] = []
         self._judge = judge
+        self._asked: dict[str, PerformFragment] = {}
+        self._ends: dict[str, asyncio.TimerHandle] = {}
         self._free = 0.0
         self._open = False
 
@@ -56,6 +58,8 @@ class Generation:
                         self._take(bus, desk, request)
                     case Cancel(id=id):
                         self.cancelled.append(id)
+                        self._ends[id].cancel()
+                        self._end(bus, desk, self._asked[id], "interrupted")
 
     def _take(self, bus: Bus, desk: RequestDesk, request: PerformFragment) -> None:
         loop, fragment = asyncio.get_running_loop(), request.fragment
@@ -69,7 +73,8 @@ class Generation:
         desk.accept(request.id)
         self._open = fragment.turn_status in ("beginning", "middle")
         self._free = max(self._free, loop.time()) + LASTS
-        loop.call_at(self._free, self._end, bus, desk, request, verdict)
+        self._asked[request.id] = request
+        self._ends[request.id] = loop.call_at(self._free, self._end, bus, desk, request, verdict)
 
     def _end(self, bus: Bus, desk: RequestDesk, request: PerformFragment, status: str) -> None:
         id = request.fragment.id

@@ -73,6 +73,7 @@ ELSEWHERE = {
     ("docs/pieces.md", "python"): "tests/perception/pieces/test_pieces_page.py",
     ("docs/pieces.md", "toml"): "tests/perception/pieces/test_pieces_page.py",
     ("docs/people.md", "python"): "tests/client/test_people_page.py",
+    ("docs/conversations.md", "python"): "tests/client/conversation/test_page.py",
     ("docs/talk.md", "python"): "tests/client/test_small_talk.py",
     ("docs/console.md", "nginx"): "tests/console/test_path.py",
     ("docs/voice-frameworks.md", "python"): "tests/frameworks",

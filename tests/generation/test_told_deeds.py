@@ -17,7 +17,8 @@ from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.summary import Summary, summary
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.language_models import perform_call, stream
-from engage_hri.services.client.robot import PerformFailed, Robot
+from engage_hri.services.client.performing import PerformFailed
+from engage_hri.services.client.robot import Robot
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.runtime.service import running

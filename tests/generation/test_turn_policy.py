@@ -336,6 +336,7 @@ def test_a_turn_may_speak_to_another_person_than_the_one_before() -> None:
     ],
 )
 def test_a_delay_that_holds_nothing_is_warned_of(fields: dict[str, Any], warning: str) -> None:
-    told = tuple(in_vain(TurnFragment(id="f", **fields)))
+    fragment = TurnFragment(id="f", **fields)
+    told = tuple(in_vain(fragment, plan_turn(fragment, "f", "ann")))
 
     assert [warning in text for text in told] == [True] * bool(warning)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import msgspec
 import typer
@@ -37,6 +37,9 @@ from engage_hri.services.control.bases.error_place import seen_at, words_of
 from engage_hri.services.runtime.installation import extra_command, has_hearing
 from engage_hri.services.runtime.service import running
 
+if TYPE_CHECKING:
+    from engage_hri.services.client.conversation.tools import ToolSource
+
 RULES = Path(__file__).with_name("small_talk.py")
 AGAIN: Seconds = 2.0
 """Time from the failure of a manager until it begins again."""
@@ -55,6 +58,29 @@ class Options(Written, Embodied, Hearing, Shown):
             help="What the robot says, as `async def talk(robot)`; written for you to change if there is none.",
             show_default="a few rules",
         ),
+    ] = None
+    model: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MODEL",
+            help="A model leads the talk in place of rules: openai:NAME, anthropic:NAME, ollama:NAME, with @ADDRESS "
+            "of another server; or http://HOST:PORT/v1#NAME. Its key is in OPENAI_API_KEY, ANTHROPIC_API_KEY, or for "
+            "another server in ENGAGE_MODEL_KEY.",
+            show_default=False,
+        ),
+    ] = None
+    tools: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="TOOLS",
+            help="Tools that the model may call: FILE.py, its functions; or an MCP server: its address, or the "
+            "command that starts it. May be repeated.",
+            show_default=False,
+        ),
+    ] = None
+    prompt: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="What the model is told of its part, a text.", show_default=False),
     ] = None
     window: Annotated[
         bool | None, typer.Option(help="Talk in the browser; with --from it is not.", show_default=False)
@@ -83,7 +109,7 @@ def main(options: Options) -> int:
     """Talk until a signal, or until the file that is heard is over."""
     if options.kiosk and not options.has_window:
         raise seat_refusal("--kiosk")
-    manager = read_manager(options.manager)
+    manager = read_manager(options.manager) if options.model is None else led_by_model(options)
     config = options.read(complete(), defaults=tuple(_defaults(manager, options.has_window)))
     for lack in _lacks(config):
         complain(lack)
@@ -106,17 +132,68 @@ def read_manager(path: Path | None) -> ManagerFile:
             complain(f"{path} is written: change it, and start again")
         except OSError as error:
             raise RunFailed(Fault(reason=f"it cannot be written: {error.strerror}", where=str(path))) from error
-    try:
-        names = runpy.run_path(str(path or RULES))
-    except Exception as error:
-        raise InputRefused(
-            Fault(reason=f"it cannot be run: {words_of(error)}", where=str(path), advice=seen_at(error))
-        ) from error
+    names = _run(path or RULES)
     if not inspect.iscoroutinefunction(names.get("talk")):
         advice = "`async def talk(robot)`: it gets a Robot, and talks until it is cancelled"
         raise InputRefused(Fault(reason="there is no talk in it", where=str(path), advice=advice))
     phrases = _phrases(names, "PHRASES", path)
     return ManagerFile(names["talk"], phrases, _phrases(names, "EXAMPLES", path) or phrases)
+
+
+def led_by_model(options: Options) -> ManagerFile:
+    """Make the manager that has a model lead the talk. Raises InputRefused."""
+    from engage_hri.services.client.conversation.models import model_of
+    from engage_hri.services.client.conversation.talk import Conversation
+
+    if options.manager is not None:
+        raise InputRefused(Fault(reason="either --manager or --model leads the talk", where="--model"))
+    assert options.model is not None
+    model_of(options.model)
+    tools = [tool for source in options.tools or () for tool in _tools(source)]
+    try:
+        prompt = options.prompt.read_text(encoding="utf-8") if options.prompt else ""
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputRefused(Fault(reason=f"it cannot be read: {error}", where=str(options.prompt))) from error
+    named = options.model
+
+    async def talk(robot: Robot) -> None:
+        async with Conversation(robot, named, tools=tools, prompt=prompt) as conversation:
+            known: set[str] = set()
+            with robot.worlds() as worlds:
+                async for world in worlds:
+                    here = {each.id for each in world.people}
+                    for person in here - known:
+                        conversation.answer(person)
+                    known = here
+
+    return ManagerFile(talk, (), ())
+
+
+def _tools(source: str) -> "list[ToolSource]":
+    """Find the tools that a source of the command line has. Raises InputRefused."""
+    from engage_hri.services.client.conversation.tools import function_tool, server_of
+
+    if not source.endswith(".py") or " " in source:
+        return [server_of(source)]
+    names = _run(Path(source))
+    found = [
+        function_tool(each)
+        for name, each in names.items()
+        if inspect.isfunction(each) and each.__module__ == names["__name__"] and not name.startswith("_")
+    ]
+    if not found:
+        raise InputRefused(Fault(reason="there is no function in it", where=source))
+    return list(found)
+
+
+def _run(path: Path) -> dict[str, Any]:
+    """Run a file, for the names that it has then. Raises InputRefused."""
+    try:
+        return runpy.run_path(str(path))
+    except Exception as error:
+        raise InputRefused(
+            Fault(reason=f"it cannot be run: {words_of(error)}", where=str(path), advice=seen_at(error))
+        ) from error
 
 
 def _phrases(names: dict[str, Any], name: str, path: Path | None) -> tuple[str, ...]:

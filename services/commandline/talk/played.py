@@ -26,7 +26,7 @@ from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import ENDINGS, ConnectionEvent
 from engage_hri.schemas.summary import summary
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.client.robot import NewWords
+from engage_hri.services.client.performing import NewWords
 from engage_hri.services.commandline.shell.outputs import Outputs
 from engage_hri.services.commandline.shell.process import DONE, FAILED
 from engage_hri.services.commandline.shell.sources import Thing

@@ -206,6 +206,9 @@ class TurnPolicy:
             turn = fragment.id
         plan = plan_turn(fragment, turn, addressee)
         if self._open is not None:
+            # What is said before a question answers somebody, or nobody: the pair begins with the question.
+            asks = plan.closes and fragment.turn_index == 1 and fragment.within is not None
+            plan = replace(plan, announces_pair=asks and not self._open.announces_pair)
             if plan.interruptible is None:
                 plan = replace(plan, interruptible=self._open.interruptible)
             if plan.interruptible_after is None:
@@ -396,7 +399,7 @@ def _refused(id: str, why: Fault) -> Fault:
     return why.following(refused, "") if why.reason else Fault(reason=refused)
 
 
-def in_vain(fragment: TurnFragment) -> Iterator[str]:
+def in_vain(fragment: TurnFragment, turn: TurnPlan) -> Iterator[str]:
     """Warnings for what a fragment asks for in vain: holding a turn that is not held, time that nobody waits."""
     status = fragment.turn_status
     if fragment.delay_target and not fragment.delay:
@@ -405,8 +408,8 @@ def in_vain(fragment: TurnFragment) -> Iterator[str]:
         yield f"delay: after {status!r} there is no turn to hold"
     elif fragment.delay and not fragment.delay_target:
         yield "delay: the world has no surface to look at; name a delayTarget"
-    if fragment.within is not None and not (TABLE[status].opens and fragment.turn_index == 1):
-        yield "within: an answer is awaited where a first turn begins, with 'beginning' or 'full'"
+    if fragment.within is not None and not turn.announces_pair:
+        yield "within: an answer is awaited where a first turn begins, or at the end of one that has asked for none"
 
 
 def _illegal(fragment: TurnFragment, field: str, reason: str, advice: str) -> InputRefused:
