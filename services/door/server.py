@@ -25,7 +25,8 @@ from engage_hri.schemas.summary import Summary
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.client.feeds import Feed
-from engage_hri.services.client.robot import PerformFailed, Robot
+from engage_hri.services.client.performing import PerformFailed
+from engage_hri.services.client.robot import Robot
 from engage_hri.services.door.openapi import DoorRefusal, document
 from engage_hri.services.door.operations import OPERATIONS, SPEAKS, TOPICS, Operation, Right, queried, topics
 from engage_hri.services.door.speaking import (

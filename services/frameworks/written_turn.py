@@ -2,34 +2,26 @@
 
 Voice frameworks differ in their frames and events, and agree in what they need of a voice: text comes in bits; they
 are told when it begins to sound, which words have sounded, and that it is over; they may break it off, and then want
-to know how far it got. `stream` alone takes an iterator and, if it is cancelled, tells nothing. Here a turn is an
-object; what it said follows from generation's own account of the turn (`TurnClosed`) where it was broken off.
+to know how far it got. `RobotTurn` is all that, for a body that awaits. A framework calls, and waits for nothing: so
+what it writes waits here in a line, and a task is the body.
 """
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 
 from engage_hri.schemas.blocks import BlockProgress, Feedback
-from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
-from engage_hri.schemas.fragments import FragmentOutcome, TurnClosed
+from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.summary import Summary, summary
-from engage_hri.schemas.text import joined
 from engage_hri.schemas.tool import ToolInput
-from engage_hri.schemas.units import Seconds
 from engage_hri.services.client.feeds import Feed
-from engage_hri.services.client.language_models import PLAIN_TURN, Piece, stream, summary_of
+from engage_hri.services.client.language_models import PLAIN_TURN, summary_of
 from engage_hri.services.client.robot import Robot
+from engage_hri.services.client.turn import Piece, RobotTurn
 
 LONGEST_TURN = 2**16
 """Characters of one turn, more than an hour of talk. What is written is kept until it has been said."""
-ACCOUNT_PATIENCE: Seconds = 2.0
-"""Time for which the account of a turn that was stopped is waited for: a voice ends its word, which takes less."""
-BEGINNING: Seconds = 0.3
-"""Time after a stop in which what was on its way to the robot has begun, or never will: nobody tells that of it."""
-
-STEERING: Seconds = 5.0
-"""Time that the realizer has to hold a block, or to let it go on."""
 
 
 class WrittenTurn:
@@ -52,24 +44,21 @@ class WrittenTurn:
     ) -> None:
         self.id = id
         self._robot = robot
-        self._turn = turn
-        self._await_answer = await_answer
+        self._turn = RobotTurn(robot, id, turn, await_answer=await_answer)
         self._on_start = on_start
         self._on_word = on_word
-        self._words: list[str] = []
-        self._has_begun = False
-        self._live: dict[str, None] = {}
-        """Its blocks that have begun and not ended, in order."""
         self._waiting: asyncio.Queue[Piece | None] = asyncio.Queue()
         self._written = 0
-        self._is_ended = False
-        self._speaking: asyncio.Task[Summary] | None = None
+        self._is_ended = self._is_stopped = False
+        self._speaking: asyncio.Task[None] | None = None
+        self._live: dict[str, None] = {}
+        """Its blocks that have begun and not ended, in order."""
         self._task = asyncio.create_task(self._run(), name=f"turn {id}")
 
     @property
     def said(self) -> str:
         """The words that have sounded so far; at the end exactly what was said, as `Summary.said`."""
-        return self._task.result().said if self.is_over else joined(self._words)
+        return self._task.result().said if self.is_over else self._turn.said
 
     @property
     def is_over(self) -> bool:
@@ -100,20 +89,22 @@ class WrittenTurn:
 
     def stop(self) -> None:
         """End the turn at the next word. `over` tells what was said until then."""
-        self._is_ended = True
-        if self._speaking is not None:
-            self._speaking.cancel()
+        if not self._is_stopped and self._speaking is not None:
+            self._speaking.cancel()  # once: it may be stopping already, and then it tells what was said
+        self._is_ended = self._is_stopped = True
 
     async def hold(self) -> None:
         """Let the robot wait at the next word, and where a movement can, until `resume`.
 
         Raises InputRefused if nothing of the turn is being performed at this moment.
         """
-        await self._steer(self._robot.hold)
+        self._check_live()
+        await self._turn.hold()
 
     async def resume(self) -> None:
         """Let it go on from there. Raises as `hold` does."""
-        await self._steer(self._robot.resume)
+        self._check_live()
+        await self._turn.resume()
 
     async def over(self) -> Summary:
         """Wait for the end of the turn, however it comes, and return what became of it. Cancelling this stops it."""
@@ -124,55 +115,48 @@ class WrittenTurn:
             await asyncio.wait([self._task])
             raise
 
-    async def _steer(self, steer: Callable[..., Awaitable[tuple[str, ...]]]) -> None:
-        """Steer all blocks of the turn that are live: the next begins before the one that speaks has ended."""
-        refusal = InputRefused(Fault(reason="nothing of it is being said", where=self.id))
-        steered = False
-        for block in tuple(self._live):
-            try:
-                steered |= bool(await steer(block, timeout=STEERING))
-            except InputRefused as error:  # it has ended meanwhile
-                refusal = error
-        if not steered:
-            raise refusal
+    def _check_live(self) -> None:
+        if not self._live:
+            raise InputRefused(Fault(reason="nothing of it is being said", where=self.id))
 
     async def _run(self) -> Summary:
-        with self._robot.words() as words, self._robot.feedback() as feedback, self._robot.turns() as turns:
-            hearing = asyncio.create_task(self._hear(words), name=f"words of {self.id}")
+        with self._robot.feedback() as feedback:
             following = asyncio.create_task(self._follow(feedback), name=f"blocks of {self.id}")
+            hearing = asyncio.create_task(self._hear(), name=f"words of {self.id}")
             self._speaking = asyncio.create_task(self._speak(), name=f"speech of {self.id}")
             try:
-                await asyncio.wait([self._speaking])
-                if self._speaking.cancelled():
-                    return await self._account(turns)
-                return self._speaking.result()
+                with suppress(asyncio.CancelledError):  # it was stopped, which is no error of whoever waits
+                    await self._speaking
+                return summary(*self._turn.outcomes, *self._never_written())
+            except EngageError as error:
+                return summary_of(error)
             finally:
-                for task in (tasks := (hearing, following, self._speaking)):
+                for task in (following, hearing):
                     task.cancel()
-                await asyncio.wait(tasks)
+                await asyncio.wait([following, hearing])
 
-    async def _speak(self) -> Summary:
-        if self._is_ended and self._waiting.empty():
-            raise asyncio.CancelledError  # it was stopped before it began
-        try:
-            outcomes = await stream(
-                self._robot, self._pieces(), id=self.id, turn=self._turn, await_answer=self._await_answer
+    def _never_written(self) -> Iterator[FragmentOutcome]:
+        """Outcome of what was still in line when the turn was stopped: the turn itself knows nothing of it."""
+        waits = not self._waiting.empty() and self._waiting.get_nowait() is not None
+        if self._is_stopped and (waits or self._turn.unsaid):
+            stopped = Fault(reason="it was stopped", where=self.id)
+            yield FragmentOutcome(
+                id=self.id, fragment=self.id, status="interrupted", unsaid=(self.id,), fault=stopped
             )
-        except EngageError as error:
-            return summary_of(error)
-        return summary(*outcomes)
 
-    async def _pieces(self) -> AsyncIterator[Piece]:
-        while (piece := await self._waiting.get()) is not None:
-            yield piece
+    async def _speak(self) -> None:
+        if self._is_stopped:
+            return
+        async with self._turn as turn:
+            while (piece := await self._waiting.get()) is not None:
+                await turn.write(piece)
 
-    async def _hear(self, words: Feed[WordSpoken]) -> None:
-        async for word in words:
-            if self._is_own(word.block):
-                self._words.append(word.word)
-                self._on_word(word.word)
+    async def _hear(self) -> None:
+        async for word in self._turn.words():
+            self._on_word(word)
 
     async def _follow(self, feedback: Feed[Feedback]) -> None:
+        has_begun = False
         async for told in feedback:
             if not isinstance(told, BlockProgress) or told.block is None or not self._is_own(told.block):
                 continue
@@ -180,36 +164,10 @@ class WrittenTurn:
                 self._live.pop(told.block, None)
                 continue
             self._live[told.block] = None
-            if not self._has_begun:
-                self._has_begun = True
+            if not has_begun:
+                has_begun = True
                 self._on_start()
 
     def _is_own(self, block: str) -> bool:
         name, _, number = block.rpartition("-")
         return name == self.id and number.isdecimal()
-
-    async def _account(self, turns: Feed[TurnClosed]) -> Summary:
-        """Account of a turn that was stopped."""
-        first = f"{self.id}-1"
-        told = await self._closed(turns, first, BEGINNING)
-        if told is None and self._has_begun:
-            told = await self._closed(turns, first, ACCOUNT_PATIENCE - BEGINNING)
-        stopped = FragmentOutcome(
-            id=first,
-            fragment=first,
-            status="interrupted",
-            unsaid=(self.id,),
-            spoken=told.spoken if told else (),
-            events=told.events if told else (),
-            heard=told.heard if told else (),
-            interjections=told.interjections if told else (),
-            fault=Fault(reason="it was stopped", where=self.id),
-        )
-        return summary(self._robot._with_new_words(stopped))
-
-    async def _closed(self, turns: Feed[TurnClosed], first: str, patience: Seconds) -> TurnClosed | None:
-        deadline = self._robot.now() + patience
-        while (told := await turns.next(max(0.0, deadline - self._robot.now()))) is not None:
-            if told.turn == first:
-                return told
-        return None
