@@ -407,6 +407,44 @@ async def test_the_camera_is_offered_where_the_robot_sees_and_says_why_there_is_
 
 
 @needs_browser
+async def test_nobody_is_told_to_press_a_camera_that_ended_by_itself(place: Place) -> None:
+    hint = "document.querySelector('.hint').textContent"
+    blind = """void (navigator.mediaDevices.getUserMedia = async () => {
+      const made = document.createElement('canvas');
+      made.getContext('2d');
+      return made.captureStream(5);
+    }, window.Worker = class {
+      postMessage() { setTimeout(() => this.onmessage({ data: { ended: 'models' } })); }
+      addEventListener() {}
+      terminate() {}
+    })"""
+    async with await open_hub("robot", connect=(place.endpoint,)) as hub, opened(place) as page:
+        hub.join("eyes", "perception").declare_alive()
+        await page.until("window.stage.state.talk.sees")
+        await sit(page)
+        await page.until(f"{hint} === 'Press the camera, and the robot sees where you look.'")
+        await page.value(blind)
+        await press(page, ".see")
+        await page.until(f"{hint}.includes('not installed')")
+        await page.value(LATER % 13_000)
+        await page.until(f"!{hint}.includes('not installed')")
+        assert await page.value(hint) == "Touch a piece to look at it."
+
+
+@needs_browser
+async def test_a_word_longer_than_a_phone_is_wide_stays_in_its_bubble(place: Place) -> None:
+    async with opened(place) as page:
+        await page.look(*PHONE)
+        await sit(page)
+        await page.value("document.querySelector('.say input').focus()")
+        await page.call("Input.insertText", text="understand" * 8)
+        await press(page, ".send")
+        await page.until("document.querySelector('.bubble.you.on span')")
+        wide = "(({ scrollWidth, clientWidth }) => scrollWidth - clientWidth)(document.querySelector('.bubble.you'))"
+        assert await page.value(wide) == 0
+
+
+@needs_browser
 async def test_axe_finds_nothing_to_complain_of(place: Place) -> None:
     axe = resources.files("axe_core_python").joinpath("axe.min.js").read_text(encoding="utf-8")
     checks = """axe.run().then(({ violations, passes }) =>

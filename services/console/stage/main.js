@@ -179,7 +179,7 @@ function hint(now) {
   const met = moment(talk, state.scene.robot, person);
   const next = visit(now - idle, { seated: true, kiosk: isKiosk, touched });
   const tips = text.tips(bar.ear, bar.eye);
-  if (next.do === "tip" && !["looking", "elsewhere"].includes(met?.text)) return tips[next.number % tips.length];
+  if (next.do === "tip" && [undefined, "mutual", "meet"].includes(met?.text)) return tips[next.number % tips.length];
   if (met?.text === "looking" && ["off", "lacking"].includes(bar.ear)) return tips[0];
   if (met) return typeof text[met.text] === "function" ? text[met.text](named(met.about)) : text[met.text];
   return tips[0];

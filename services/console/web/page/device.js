@@ -3,12 +3,12 @@
 // kind.wants: what the browser is asked for. kind.has: whether this browser has what that needs. kind.worker: the script of the worker that sends to the window,
 // and kind.isModule: as a module. kind.link: place of its link there. kind.begin: gets what is open (its stream and worker), the track, and what tells that it is on.
 // kind.end: gets what was open. session: gives that of the page's link to the window.
-// face.show: gets the state (off, asked, on), and news: what is to be told, made of words in a language, or null; isLacking: it could not be had when it was pressed.
+// face.show: gets the state (off, asked, on), and news: what is to be told, made of words in a language, or null; isLacking: it could not be had since it was last pressed, or has ended by itself.
 // face.level: gets how strong what it gives is, 0 to 1, while it is on.
 export function device(kind, session, face) {
   let on = null; // what is open while it is on, or asked for
   let news = null;
-  let isLacking = false; // it could not be had at the last press
+  let isLacking = false; // it could not be had since the last press, or has ended by itself
 
   // Why no page at this address can have it, in words; null: it can.
   const lacking = () => (navigator.mediaDevices?.getUserMedia && kind.has() ? null : (words) => words.none(isSecureContext ? words.unable : words.plain));
@@ -64,7 +64,10 @@ export function device(kind, session, face) {
   // What the worker tells: how strong it is, what is wrong, or that it has ended, with the name of a text or words.
   function take({ level, wrong, ended }, track) {
     if (level !== undefined) return face.level(level);
-    if (ended !== undefined) return failed((words) => words[ended] ?? (ended || words.broken));
+    if (ended !== undefined) {
+      isLacking = true;
+      return failed((words) => words[ended] ?? (ended || words.broken));
+    }
     if (wrong === undefined) return;
     if (track.readyState === "ended") return gone();
     const [name, about] = wrong ?? (track.muted ? ["muted"] : []);
