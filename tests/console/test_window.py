@@ -74,8 +74,9 @@ async def opened(place: Place, url: str = "") -> AsyncIterator[Page]:
         await page.until("window.engage?.state.scene?.body && window.engage.state.you", 60)
         yield page
         # A seat of which the page goes is kept for a while, and the next test would find two people.
-        await page.value("window.engage.state.you?.person && window.engage.send({ do: 'leave' });0")
-        await page.until("!window.engage.state.you?.person")
+        if not await page.value("document.querySelector('.away').textContent.includes('does not answer')"):
+            await page.value("window.engage.state.you?.person && window.engage.send({ do: 'leave' });0")
+            await page.until("!window.engage.state.you?.person")
         home = url.split("/")[2]
         strangers = [each for each in page.requests if not each.startswith("data:") and each.split("/")[2] != home]
         assert page.errors == []

@@ -1,12 +1,12 @@
 """Command `engage demo`: the whole system in this process plays the anchor tangram with a simulated person."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -135,7 +135,8 @@ async def demonstrate(
                 page = windowed(
                     shown, options, tell, language=spoken.language, examples=spoken.phrases, kiosk=options.kiosk
                 )
-                await _shown(play, page, shown, again=options.kiosk)
+                again = options.is_for_visitors and options.record is None
+                await _shown(play, page, shown, again=again, kiosk=options.kiosk)
     return tallying.tally
 
 
@@ -145,8 +146,12 @@ async def _shown(
     shown: "WindowServer",
     *,
     again: bool,
+    kiosk: bool,
 ) -> None:
-    """Play in a window. again: anew when the task is over, or its visitor has left, until cancelled."""
+    """Play in a window, until the task is over.
+
+    again: then anew, as soon as its visitor has left, until cancelled. kiosk: whether it is over or not.
+    """
     async with AsyncExitStack() as stays:
         is_open = False
         while again or not is_open:
@@ -154,18 +159,27 @@ async def _shown(
                 if not is_open:  # nothing was refused
                     await stays.enter_async_context(page)
                     is_open = True
-                ends = [asyncio.create_task(over.wait()), *([asyncio.create_task(_left(shown))] if again else [])]
-                try:
-                    await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
-                finally:
-                    for each in ends:
-                        each.cancel()
-                    await asyncio.wait(ends)
+                if kiosk:
+                    await _first(over.wait(), _left(shown, None))
+                else:
+                    await over.wait()
+                    if again:
+                        await _left(shown, shown.bus.now())
 
 
-async def _left(shown: "WindowServer") -> None:
-    """Wait until somebody was there, and nobody has been for a while."""
-    last: float | None = None
+async def _first(*waits: Coroutine[Any, Any, Any]) -> None:
+    """Wait for the first of several."""
+    tasks = [asyncio.create_task(each) for each in waits]
+    try:
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for each in tasks:
+            each.cancel()
+        await asyncio.wait(tasks)
+
+
+async def _left(shown: "WindowServer", last: Seconds | None) -> None:
+    """Wait until nobody has been there for a while. last: when somebody was; None: until somebody has been at all."""
     while last is None or shown.bus.now() - last < EMPTY:
         if shown.picture.present:
             last = shown.bus.now()

@@ -60,6 +60,8 @@ PIECES = (
 
 The white one is a trapezoid: the dictionary of `sphinx` has no such word."""
 SEVERAL = "There are several of these. Say colour and shape, as in: where is the blue square."
+WORDLESS = r"(ha ?h?)+|(please )?(stop|wait|be quiet)( please)?"
+"""What a nod answers: laughter, and what somebody says for the robot to be still."""
 OTHERWISE = "[shake] I did not understand that. Say, for example: {example}."
 SILENCE = (
     # seconds in which somebody has said nothing, and what the robot says then; the first one greets
@@ -133,6 +135,8 @@ def answer(words: str, things: Iterable[Entity] = ()) -> str:
     words: as they were understood, or typed. things: on the table.
     """
     plain = " ".join(re.findall(r"[\w']+", words.lower()))
+    if re.fullmatch(WORDLESS, plain):
+        return "[nod]"
     texts = {phrase: text for phrases, text in RULES.items() for phrase in phrases}
     found = max((each for each in texts if re.search(rf"\b{each}\b", plain)), key=len, default="")
     if " " not in found and (text := shown({*plain.split()}, things)):

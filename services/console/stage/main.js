@@ -187,10 +187,13 @@ function hint(now) {
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
 let last = 0;
+let before = clock();
 function tick() {
   requestAnimationFrame(tick);
   const now = clock();
   if (isTalking() || bar.isSeen) idle = now;
+  else if (state.talk?.voices.some(({ actor }) => actor === state.scene?.robot)) idle += now - before; // who listens does nothing else
+  before = now;
   const next = visit(now - idle, { seated: Boolean(state.person), kiosk: isKiosk, touched });
   if (next.do === "anew") {
     touched = false;

@@ -134,6 +134,7 @@ class _Installed(StaticFiles):
 
     def __init__(self) -> None:
         super().__init__(directory=data_folder(), check_dir=False)
+        self.config_checked = True  # what is not installed is told below
         self._names = {name for parcel in PARCELS for name in parcel.names()}
 
     async def get_response(self, path: str, scope: Any) -> Response:
