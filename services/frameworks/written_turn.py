@@ -62,7 +62,7 @@ class WrittenTurn:
         """Its blocks that have begun and not ended, in order."""
         self._waiting: asyncio.Queue[Piece | None] = asyncio.Queue()
         self._written = 0
-        self._is_ended = False
+        self._is_ended = self._is_stopped = False
         self._speaking: asyncio.Task[Summary] | None = None
         self._task = asyncio.create_task(self._run(), name=f"turn {id}")
 
@@ -100,7 +100,7 @@ class WrittenTurn:
 
     def stop(self) -> None:
         """End the turn at the next word. `over` tells what was said until then."""
-        self._is_ended = True
+        self._is_ended = self._is_stopped = True
         if self._speaking is not None:
             self._speaking.cancel()
 
@@ -141,6 +141,8 @@ class WrittenTurn:
             hearing = asyncio.create_task(self._hear(words), name=f"words of {self.id}")
             following = asyncio.create_task(self._follow(feedback), name=f"blocks of {self.id}")
             self._speaking = asyncio.create_task(self._speak(), name=f"speech of {self.id}")
+            if self._is_stopped:  # before it began
+                self._speaking.cancel()
             try:
                 await asyncio.wait([self._speaking])
                 if self._speaking.cancelled():
@@ -152,8 +154,6 @@ class WrittenTurn:
                 await asyncio.wait(tasks)
 
     async def _speak(self) -> Summary:
-        if self._is_ended and self._waiting.empty():
-            raise asyncio.CancelledError  # it was stopped before it began
         try:
             outcomes = await stream(
                 self._robot, self._pieces(), id=self.id, turn=self._turn, await_answer=self._await_answer
