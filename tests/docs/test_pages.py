@@ -76,7 +76,7 @@ ELSEWHERE = {
     ("docs/conversations.md", "python"): "tests/client/conversation/test_page.py",
     ("docs/talk.md", "python"): "tests/client/test_small_talk.py",
     ("docs/console.md", "nginx"): "tests/console/test_path.py",
-    ("docs/voice-frameworks.md", "python"): "tests/frameworks",
+    ("docs/voice-frameworks.md", "python"): "tests/frameworks/test_voice_page.py",
     ("docs/other-languages.md", "bash"): "tests/door/test_door_page.py",
     ("docs/other-languages.md", "javascript"): "tests/door/test_door_page.py",
     ("docs/hostile.md", "sh"): "tests/hostile/test_command.py",

@@ -98,6 +98,13 @@ async def test_a_reply_is_said_by_the_robot_which_looks_where_it_refers_to() -> 
     assert here.states[-2:] == ["speaking", "listening"]
 
 
+async def test_it_points_where_the_text_is_certain() -> None:
+    async with scene(("Please take [blue-", "square!].")) as here:
+        await here.session.run(user_input="What shall I do?")
+
+    assert [(each.object, each.by) for each in here.told[0].references] == [("blue-square", "pointing")]
+
+
 @pytest.mark.parametrize("after", [0.23 * number for number in range(1, 14)])
 async def test_the_history_of_an_interrupted_reply_has_what_was_said_and_no_more(after: float) -> None:
     async with scene(LONG, ("Sorry.",)) as here:

@@ -115,6 +115,14 @@ async def test_a_response_is_spoken_and_its_words_go_on_as_they_sound() -> None:
     assert here.told[0].references[0].by == "a look"
 
 
+async def test_it_points_where_the_text_is_certain() -> None:
+    async with scene() as here:
+        await here.play(*response("Please take [blue-", "square!]."))
+
+    assert [(each.object, each.by) for each in here.told[0].references] == [("blue-square", "pointing")]
+    assert here.kept == [here.told[0].said]
+
+
 async def test_the_context_has_what_was_heard_of_several_turns() -> None:
     async with scene() as here:
         await here.play(*BLUE, *response("Thank you."), TTSSpeakFrame("Goodbye."))

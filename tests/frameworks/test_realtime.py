@@ -83,6 +83,14 @@ async def test_responses_are_said_in_order_and_the_conversation_stays_as_it_is(i
     assert here.api.items == before
 
 
+async def test_it_points_where_the_text_is_certain() -> None:
+    async with scene(("Please take [blue-", "square!].")) as here:
+        await here.ask()
+        await here.over()
+
+    assert [(each.object, each.by) for each in here.told[0].references] == [("blue-square", "pointing")]
+
+
 @pytest.mark.parametrize("pause", [0.05, 5.0])
 async def test_text_that_was_cut_is_put_anew_with_the_words_that_were_said(pause: float) -> None:
     async with scene(LONG, ("Sorry.",), pause=pause) as here:

@@ -100,6 +100,18 @@ async def test_a_turn_that_is_stopped_at_any_instant_tells_exactly_what_was_hear
     assert (after.status, after.said) == ("done", "Sorry.")
 
 
+async def test_a_turn_that_is_stopped_before_it_could_begin_is_over_at_once() -> None:
+    async with scene() as here:
+        began = here.robot.now()
+        turn = WrittenTurn(here.robot, "t")
+        turn.write(TEXT)
+        turn.stop()
+        told = await turn.over()
+
+        assert here.robot.now() - began < 0.5
+    assert (told.status, told.said, told.cut_short) == ("interrupted", "", True)
+
+
 @pytest.mark.parametrize("seed", range(share_of(30)))
 async def test_so_does_one_into_which_a_person_speaks(seed: int) -> None:
     chance = random.Random(seed)
