@@ -21,7 +21,7 @@ from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorLost, U
 from engage_hri.schemas.recognition import Floor, Interjection, InterjectionReading
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Reading
-from engage_hri.services.client.turn_ends import EndOfTurn, Habits, SoFar
+from engage_hri.services.client.turn_ends import EndOfTurn, PersonPauses, SoFar
 from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports, events
 from engage_hri.services.reports.same_people import PeopleNames
 
@@ -68,7 +68,7 @@ class HeardTurn:
 
     @property
     def reading(self) -> InterjectionReading | None:
-        """What it is, if it was said into a turn of the robot, as of `Interjection`; None: it was not."""
+        """Reading of it, as of `Interjection`, if it was said into a turn of the robot; None: it was not."""
         return self._reading
 
     @property
@@ -110,7 +110,7 @@ class HeardFeed(Reading[HeardTurn]):
         self._from = bus.now()
         self._reports = ActionReports(bus.robot, REPORT_GRACE, bus.clock, self._instant)
         self._names = PeopleNames()
-        self._habits = Habits()
+        self._habits = PersonPauses()
         self._open: dict[str, HeardTurn] = {}
         self._last: dict[str, HeardTurn] = {}
         """The last turn of each person that is over."""
@@ -278,7 +278,7 @@ class HeardFeed(Reading[HeardTurn]):
     # -- its end ------------------------------------------------------------------------------------------------
 
     def _end_of(self, turn: HeardTurn) -> Seconds:
-        """When the turn is over, if nothing more comes."""
+        """Time at which the turn is over, if nothing more comes."""
         if turn._speaks:
             return inf
         is_waited_for = any(not each.final for each in turn._utterances.values()) or (

@@ -189,7 +189,8 @@ class RobotTurn:
     def expect_answer(self, within: Seconds = ANSWER_WITHIN, expects: Expects = "reply") -> None:
         """Let what was written end as a question: an answer opens there, and nobody waits for it here.
 
-        within: seconds that the answer may take. expects: does moving a thing answer it?
+        within: seconds that the answer may take.
+        expects: does moving a thing answer it?
         """
         self._question = _asking(within, expects)
 
@@ -278,17 +279,26 @@ class RobotTurn:
         return len(self._fragments)
 
     def said_between(self, first: int, last: int | None = None) -> str:
-        """Return the words that were really spoken between two marks. last: None: up to the end."""
+        """Return the words that were really spoken between two marks.
+
+        first, last: how many fragments were sent before, as of `mark`; None: up to the end.
+        """
         return joined(text for fragment in self._fragments[first:last] for text in self._said_of(fragment))
 
     def unsaid_between(self, first: int, last: int | None = None) -> str:
-        """Return the words between two marks that were not spoken. last: None: up to the end."""
+        """Return the words between two marks that were not spoken.
+
+        first, last: how many fragments were sent before, as of `mark`; None: up to the end.
+        """
         outcomes = {each.fragment: each for each in self.outcomes} if self._is_over else {}
         left = [words for each in self._fragments[first:last] for words in unsaid(each, outcomes.get(each.id))]
         return joined([*left, *(texts(self._rest) if last is None else ())])
 
     def began_between(self, first: int, last: int | None = None) -> Seconds | None:
-        """Return the time at which the first word between two marks was over; None: there is none."""
+        """Return the time at which the first word between two marks was over; None: there is none.
+
+        first, last: how many fragments were sent before, as of `mark`; None: up to the end.
+        """
         return min(
             (self._first[each.id] for each in self._fragments[first:last] if each.id in self._first), default=None
         )
@@ -428,13 +438,9 @@ class RobotTurn:
                 outcomes.append(outcome_of(lost, rest))
                 if (closed := self._closed) is not None:
                     cut = replace(
-                        outcomes[-1],
-                        status="interrupted",
-                        events=closed.events,
-                        heard=closed.heard,
-                        interjections=closed.interjections,
-                        fault=Fault(reason=closed.reason, where=self.id),
-                    )
+                        outcomes[-1], status="interrupted", events=closed.events, heard=closed.heard,
+                        interjections=closed.interjections, fault=Fault(reason=closed.reason, where=self.id),
+                    )  # fmt: skip
                     outcomes[-1] = self._robot._with_new_words(cut)
             outcomes[-1] = replace(outcomes[-1], unsaid=(*outcomes[-1].unsaid, rest))
         if outcomes and self._left_out:

@@ -1,4 +1,4 @@
-"""When a person's turn is over: by silence, by what the words so far leave open, and by where the person looks. Pure.
+"""The end of a person's turn: by silence, by what the words so far leave open, and by where the person looks. Pure.
 
 A robot that waits for a fixed silence either cuts people off where they search for a word, or answers late where
 everybody would have known that the question was over. People wait for neither: the gap between turns is 0.2 s in the
@@ -57,9 +57,11 @@ _OPEN_WORDS = {language: frozenset(words.split()) for language, words in _OPEN.i
 
 
 class SoFar(Struct, frozen=True, kw_only=True):
-    """A person's turn as it is in a silence. who: the person. text: the words so far, as they are known.
+    """A person's turn as it is in a silence.
 
-    spoken: seconds of voice so far. looks_at_robot: None: nobody tells where this person looks.
+    who: id of the person. text: the words so far, as they are known.
+    spoken: seconds of voice so far.
+    looks_at_robot: True: the person looks at the robot; None: nobody tells where this person looks.
     language: as a recognizer calls it, such as `en-GB`; empty: not known.
     pauses: the person's last pauses within turns, seconds.
     """
@@ -107,7 +109,7 @@ def leaves_open(text: str, language: str = "") -> bool | None:
     return True if any(last in words for words in known) else None
 
 
-class Habits:
+class PersonPauses:
     """Pauses of each person within turns, the last few."""
 
     def __init__(self) -> None:

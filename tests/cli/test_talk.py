@@ -1,15 +1,18 @@
 """`engage talk`: the manager that it reads or writes, what it tells of what is missing, and a file that it hears."""
 
 import asyncio
+from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any, cast
 
 import pytest
 
+from engage_hri import embedded, perceive
 from engage_hri.services.commandline.look import talk
 from engage_hri.services.commandline.look.small_talk import PHRASES
 from engage_hri.services.commandline.shell.roster import complete
 from tests.cli.command import Engage, start
+from tests.client.conversation.servers import STREAMS
 
 FAILS_TWICE = """
 import asyncio
@@ -157,6 +160,31 @@ def test_a_model_leads_it_with_the_functions_of_a_file(tmp_path: Path) -> None:
     assert [each.server for each in server] == [("python", "server.py")]  # type: ignore[union-attr]
     manager = talk.led_by_model(talk.Options(model="ollama:m", tools=[str(path)]))
     assert (manager.phrases, manager.examples) == ((), ())
+
+
+async def test_a_model_greets_who_comes_and_answers(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("aiohttp", reason="needs the extra `models`")
+    said = iter((("Good morning.",), ("I am fine.",)))
+
+    async def written(self: object, body: dict[str, Any]) -> AsyncIterator[bytes]:
+        for chunk in STREAMS["ollama"](next(said)):
+            yield chunk
+
+    monkeypatch.setattr("engage_hri.services.client.conversation.models.EndpointModel._bytes", written)
+    manager = talk.led_by_model(talk.Options(model="ollama:m"))
+    async with embedded(human="none") as robot, perceive("ann", hub=robot.hub) as ann:
+        await ann.look_at(robot.id)
+        talking = asyncio.create_task(talk._managed(manager, robot))
+        with robot.turns() as turns:
+            greeting = await turns.next(10.0)
+            await ann.say("How are you?", delay=0.1)
+            answer = await turns.next(10.0)
+        talking.cancel()
+        await asyncio.wait([talking])
+
+    assert greeting is not None
+    assert answer is not None
+    assert [[each.text for each in turn.spoken] for turn in (greeting, answer)] == [["Good morning."], ["I am fine."]]
 
 
 @pytest.mark.parametrize(

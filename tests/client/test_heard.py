@@ -14,7 +14,7 @@ from engage_hri.services.client.turn_ends import (
     OPEN,
     UNSURE,
     EndOfTurn,
-    Habits,
+    PersonPauses,
     SoFar,
     leaves_open,
 )
@@ -68,7 +68,7 @@ def test_the_silence_follows_words_language_gaze_and_the_person() -> None:
 
 
 def test_the_pauses_of_each_person_are_their_own_and_old_ones_are_forgotten() -> None:
-    habits = Habits()
+    habits = PersonPauses()
     for pause in range(20):
         habits.note("ann", pause)
 

@@ -16,7 +16,7 @@ from msgspec import Struct
 import engage_hri
 from engage_hri.schemas import faults
 from engage_hri.schemas.faults import EngageError
-from engage_hri.services.client import feeds, inputs, orders, robot
+from engage_hri.services.client import feeds, inputs, orders, performing, robot
 from engage_hri.services.control.contract import body
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
@@ -28,7 +28,7 @@ UNIT = re.compile(r"\b(seconds|metres|meters|radians|degrees|m/s|loop times?|how
 """What says of a bare number what it counts or measures; so does a range, such as 0..1."""
 RANGE = re.compile(r"\d\.\.\d|[([]\d, \d[)\]]|>= 0|from 1")
 RAISED = re.compile(r"^    (\w+): ", re.MULTILINE)
-CALLS_INTO = (robot, orders, inputs, feeds, body)
+CALLS_INTO = (robot, performing, orders, inputs, feeds, body)
 """Files whose functions the public ones call."""
 
 
@@ -56,9 +56,17 @@ def functions() -> Iterator[Public]:
             yield Public(name, node, "")
         else:
             assert isinstance(node, ast.ClassDef)
-            for each in node.body:
+            for each in (*node.body, *_of_hidden(thing)):
                 if isinstance(each, Function) and not each.name.startswith("_"):
                     yield Public(f"{name}.{each.name}", each, name)
+
+
+def _of_hidden(thing: type) -> Iterator[ast.stmt]:
+    """What a robot has of the base that performs, which is no public name."""
+    if thing is robot.Robot:
+        (node,) = ast.parse(inspect.getsource(performing.PerformingRobot)).body
+        assert isinstance(node, ast.ClassDef)
+        yield from node.body
 
 
 PUBLIC = list(functions())
@@ -153,7 +161,7 @@ def test_the_search_for_errors_finds_those_of_others() -> None:
 
 
 def _error(name: str) -> Any:
-    return next((vars(place)[name] for place in (faults, robot, body, builtins) if name in vars(place)), None)
+    return next((vars(place)[name] for place in (faults, performing, body, builtins) if name in vars(place)), None)
 
 
 def _bases(names: set[str]) -> set[str]:

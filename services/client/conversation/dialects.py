@@ -17,7 +17,10 @@ from engage_hri.services.client.conversation.wire import Framing
 
 
 class ToolForm(Struct, frozen=True, kw_only=True):
-    """A tool as a model is told of it. schema: of its arguments, JSON Schema."""
+    """A tool as a model is told of it.
+
+    name: by which it is called. description: of what it does. schema: of its arguments, JSON Schema.
+    """
 
     name: str
     description: str
@@ -25,13 +28,20 @@ class ToolForm(Struct, frozen=True, kw_only=True):
 
 
 class TextBit(Struct, frozen=True):
-    """A bit of the text of an answer."""
+    """A bit of the text of an answer.
+
+    text: however short.
+    """
 
     text: str
 
 
 class CallBit(Struct, frozen=True):
-    """A bit of a tool call. number: of the call in the answer. id, name: with its first bit. json: what follows."""
+    """A bit of a tool call.
+
+    number: of the call, to count from 0 in this answer. id, name: with its first bit, else empty.
+    json: more of its arguments.
+    """
 
     number: int
     id: str = ""

@@ -14,7 +14,11 @@ from engage_hri.schemas.units import Seconds
 
 
 class ToolCall(Struct, kw_only=True):
-    """A call of a tool by the model. arguments: as it wrote them, JSON. result: empty: there is none yet."""
+    """A call of a tool by the model.
+
+    id: by which its result is told. name: of the tool. arguments: as the model wrote them, JSON.
+    result: as the model is told of it; empty: there is none yet.
+    """
 
     id: str
     name: str
@@ -23,8 +27,11 @@ class ToolCall(Struct, kw_only=True):
 
 
 class PersonSaid(Struct, kw_only=True):
-    """A turn of a person. who: id. to: ids; empty: nobody knows. began: seconds on this process' clock.
+    """A turn of a person.
 
+    who: id of the person. text: the words.
+    began: seconds on this process' clock, as of `Robot.now`.
+    to: ids of those to whom it was said; empty: nobody knows.
     is_sign: a listener's sign, a noise, or words for somebody else: nothing to answer.
     """
 
@@ -36,10 +43,13 @@ class PersonSaid(Struct, kw_only=True):
 
 
 class RobotSaid(Struct, kw_only=True):
-    """What the robot has said of one message of its model. began: when its first word was over; until then now.
+    """A message of the model, as far as the robot has said it.
 
-    said: the words that were spoken. written: as the model wrote them, without tools.
-    unsaid: words of it that were not spoken. calls: of tools, in order.
+    to: id of the person.
+    began: seconds on this process' clock: when its first word was over; before that, when it was asked for.
+    said: the words that were spoken. written: the words as the model wrote them, without those in calls.
+    unsaid: words of it that were not spoken; an object in brackets where its phrase was not.
+    calls: of tools, in order.
     """
 
     to: str

@@ -159,7 +159,10 @@ class Conversation:
                 await self._news.wait()
 
     def answer(self, person: str) -> None:
-        """Let the model speak to a person who has said nothing, such as one who has just come."""
+        """Let the model speak to a person who has said nothing, such as one who has just come.
+
+        person: id.
+        """
         self._to_answer = person
         self._wakes.set()
 
@@ -231,7 +234,7 @@ class Conversation:
                 self._settle(turn, entry, first, last)
 
     async def _message(self, turn: RobotTurn, entry: RobotSaid) -> Sequence[ToolCall]:
-        """Have the model write a message, and say it; returns the calls after which it goes on."""
+        """Ask the model for a message, and say it; returns the calls after which it goes on."""
         while (world := await self._worlds.next(0.0)) is not None:
             self._world = world
         own = ToolForm(name=NAME, description=DESCRIPTION, schema=input_schema(self._world))

@@ -34,7 +34,7 @@ class McpServer:
 
     @asynccontextmanager
     async def tools(self) -> AsyncIterator[Sequence[ConversationTool]]:
-        """Connect, until the end of `async with`; yields the tools that it offers.
+        """Connect until the end of `async with`; yields the tools that it offers.
 
         Raises:
             InputRefused: the library `mcp` is not installed.

@@ -1,4 +1,4 @@
-"""What comes from a model's server, as events: bytes cut anywhere are put together. Pure.
+"""Events of a stream that a model's server sends: bytes cut anywhere are put together. Pure.
 
 Server-sent events as the HTML standard has them: lines end in LF, CR or both, an event ends with an empty line, of
 its fields only `data` counts here, several of them are lines of one text. Or one JSON object a line, as of Ollama.

@@ -1,4 +1,4 @@
-"""Conversation of a person and the robot: who speaks, and what follows from it for the turns and signs of both. Pure.
+"""Dialogue of a person and the robot: who speaks, and what follows from it for the turns and signs of both. Pure.
 
 What one does while the other has the floor is a sign of a listener (`Listener` of the person, a `Backchannel` of the
 robot) until it turns out to be a turn; all else is a turn at once (`Exchange`). The robot has the floor while it
@@ -22,8 +22,8 @@ from engage_hri.services.recognition.events.presence import NEVER
 from engage_hri.services.recognition.events.scene import SessionScene
 
 
-class Conversation:
-    """Conversation of one person with the robot."""
+class Dialogue:
+    """Dialogue of one person with the robot."""
 
     def __init__(self, id: str, scene: SessionScene, config: RecognitionConfig, writer: EventWriter) -> None:
         self.id = id

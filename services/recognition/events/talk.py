@@ -33,7 +33,7 @@ from engage_hri.services.recognition.events.addressing import (
     certain,
     likely,
 )
-from engage_hri.services.recognition.events.conversation import Conversation
+from engage_hri.services.recognition.events.conversation import Dialogue
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.kinds import KindRecognizer
 from engage_hri.services.recognition.events.limits import ROUNDING, LimitClock, in_time
@@ -44,7 +44,7 @@ from engage_hri.services.text.listening import is_listening, says_words
 
 SPEECHES_KEPT = 8
 """Number of speeches of each person of which words may still tell what they were, and for whom."""
-Step = Callable[[Conversation], object]
+Step = Callable[[Dialogue], object]
 
 
 class CutOff(NamedTuple):
@@ -58,7 +58,7 @@ class Talk(KindRecognizer):
 
     def __init__(self, id: str, scene: SessionScene, config: RecognitionConfig, writer: EventWriter) -> None:
         super().__init__(id, scene, config, writer)
-        self._conversation = Conversation(id, scene, config, writer)
+        self._conversation = Dialogue(id, scene, config, writer)
         self._line: deque[tuple[Seconds, Step | OwnSpeech | CutOff]] = deque()
         """What is not told yet, with its times. The first is a speech of which it is not known to whom it is."""
         self._asked_in_line: Seconds = inf
@@ -251,7 +251,7 @@ class Talk(KindRecognizer):
         self.take(at, lambda talk: self._judge(talk, speech, at))
         self.go_on(at)
 
-    def _judge(self, talk: Conversation, speech: OwnSpeech, at: Seconds) -> None:
+    def _judge(self, talk: Dialogue, speech: OwnSpeech, at: Seconds) -> None:
         """Take the words of a speech in their turn; if they decide nothing they are told all the same."""
         talk.understand(speech.part, at)
         self._writer.interject_again(self.id, speech.since, at)
@@ -292,7 +292,7 @@ class Talk(KindRecognizer):
         self.go_on(at)
         self._take_in_order(at, lambda talk: self._is_gone(talk, at, until))
 
-    def _is_gone(self, talk: Conversation, at: Seconds, until: Seconds) -> None:
+    def _is_gone(self, talk: Dialogue, at: Seconds, until: Seconds) -> None:
         talk.person_gone(at, until)
         self._speeches.clear()
 

@@ -99,6 +99,21 @@ async def test_words_calls_of_ours_and_of_others_are_one_answer(form: str) -> No
     assert here.talk.problems == []
 
 
+async def test_the_robot_looks_at_who_is_answered_before_its_first_word() -> None:
+    async with scene(("Good morning.",)) as here:
+        async with here.robot.inhibit_gaze("target", target="table"):
+            await asyncio.sleep(1.0)
+        began: list[tuple[str, tuple[str, ...]]] = []
+        with here.robot.actions() as actions:
+            await here.says("Good morning, robot.")
+            while (action := await actions.next(0.0)) is not None:
+                if isinstance(action, ActionBegan) and action.actor == here.robot.id:
+                    began.append((action.action, action.targets))
+
+    looks = [targets for kind, targets in began[: began.index(("speak", ()))] if kind == "look"]
+    assert looks[-1] == ("ann",)
+
+
 async def test_who_interrupts_is_answered_and_the_model_learns_where_it_was_cut() -> None:
     async with scene((LONG,), ("Yes? I am listening.",)) as here:
         await here.says("Count, please.", 2.5)

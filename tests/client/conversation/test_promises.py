@@ -14,6 +14,7 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.client.conversation.history import Entry, PersonSaid
 from engage_hri.services.client.conversation.talk import Conversation
 from tests.client.conversation.servers import STREAMS, Script, Written
+from tests.random_cases import share_of
 
 TOKEN = 1 / 25
 """Seconds that a token takes of a model that writes 25 a second."""
@@ -138,11 +139,11 @@ async def converse(seed: int) -> tuple[list[str], int]:
     return found, cut
 
 
-@pytest.mark.parametrize("share", range(8))
-async def test_the_history_of_25_random_conversations_is_what_a_listener_has_written_down(share: int) -> None:
+@pytest.mark.parametrize("share", range(4))
+async def test_the_history_of_random_conversations_is_what_a_listener_has_written_down(share: int) -> None:
     cuts = 0
-    for seed in range(share * 25, share * 25 + 25):
+    for seed in range(share, share_of(200, one_of=20), 4):
         found, cut = await converse(seed)
         cuts += cut
         assert found == [], seed
-    assert cuts > 5
+    assert cuts > 0
