@@ -13,7 +13,7 @@ from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import FORGOTTEN_AFTER, Deadlines
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import EventWriter, Mishap, OngoingEvent, PersonForgotten
-from engage_hri.services.recognition.events.person import PersonRecognition
+from engage_hri.services.recognition.events.person import Part, PersonRecognition
 from engage_hri.services.recognition.events.scene import SessionScene, TakenUp
 
 Step = Callable[[PersonRecognition], object]
@@ -113,7 +113,7 @@ class People:
         is_found = before.presence.here and before.presence.reported
         self._drop(other, at, at)
         self._contacts.pop(kept, None)  # what was told of the other may be taken for it
-        gazes = [self._scene.gaze, *(person.gaze for person in self.persons.values())]
+        gazes = [self._scene.gaze, *(person.gazes.gaze for person in self.persons.values())]
         for gaze in gazes:
             gaze.targets = tuple(kept if target == other else target for target in gaze.targets)
         if is_found:
@@ -146,30 +146,29 @@ class People:
         assert at is not None
         self.apply(id, at, lambda person: person.pass_time(at))
 
-    def observe(self, id: str, at: Seconds, step: Step, *, by_look: bool = False) -> None:
-        """Apply a step that an observation of one person asks for; the person may be new. by_look: see `_update`."""
+    def observe(self, id: str, at: Seconds, step: Step, part: Part = "all") -> None:
+        """Apply a step that an observation of one person asks for; the person may be new. part: that it may change."""
         person = self.person(id)
-        self._apply(person, at, step, by_look=by_look)
+        self._apply(person, at, step, part)
         self._follow(at)
         if person.presence.here or id not in self._unseen:
             self._note(person, at)
 
-    def apply(self, id: str, at: Seconds, step: Step) -> None:
-        """Apply a step to one person."""
-        self._apply(self.persons[id], at, step)
+    def apply(self, id: str, at: Seconds, step: Step, part: Part = "all") -> None:
+        """Apply a step to one person. part: that it may change."""
+        self._apply(self.persons[id], at, step, part)
         self._follow(at)
 
     def apply_to_all(
         self,
         at: Seconds,
         step: Step,
+        part: Part = "all",
         where: Callable[[PersonRecognition], object] = lambda person: True,
-        *,
-        by_look: bool = False,
     ) -> None:
-        """Apply a step to all who are here. where: tells for whom it may change something. by_look: see `_update`."""
+        """Apply a step to all who are here. part: that it may change. where: tells for whom it may change something."""
         for person in [person for person in self._here.values() if where(person)]:
-            self._apply(person, at, step, by_look=by_look)
+            self._apply(person, at, step, part)
         self._follow(at)
 
     def _follow(self, at: Seconds) -> None:
@@ -215,26 +214,23 @@ class People:
         """Update the deadlines of those whose looks may direct the robot's now, for what all share has changed."""
         for person in list(self._here.values()):
             if person.gazes.look_directs_at < inf:
-                self._apply(person, at, lambda person: None, by_look=True)
+                self._apply(person, at, lambda person: None, "looks")
 
-    def _apply(self, person: PersonRecognition, at: Seconds, step: Step, *, by_look: bool = False) -> None:
-        """Apply a step to one person; a bug that shows in it does not affect the others. by_look: see `_update`."""
+    def _apply(self, person: PersonRecognition, at: Seconds, step: Step, part: Part = "all") -> None:
+        """Apply a step to one person; a bug that shows in it does not affect the others. part: that it may change."""
         try:
             step(person)
-            self._update(person, by_look=by_look)
+            self._update(person, part)
         except Exception as error:
             if self._strict:
                 raise
             self._writer.effects.append(Mishap(person.id, at, error))
             self.lose_track(person, at)
 
-    def _update(self, person: PersonRecognition, *, by_look: bool = False) -> None:
-        """Note when the person is due, whether it is asked, its contact with the robot, and whether it is here.
-
-        by_look: nothing but looks and presence has changed.
-        """
+    def _update(self, person: PersonRecognition, part: Part = "all") -> None:
+        """Note when the person is due, whether it is asked, its contact with the robot, and whether it is here."""
         id, scene, presence = person.id, self._scene, person.presence
-        if not by_look:
+        if part != "looks":
             asked_since = person.talk.asked_since
             if asked_since < inf or id in scene.asked:
                 self._asks(person, asked_since)
@@ -242,10 +238,10 @@ class People:
                 scene.unknown[id] = since
             elif scene.unknown:
                 scene.unknown.pop(id, None)
-        due = person.note_deadlines(by_look=by_look)
-        self.agenda.set(id, None if due == inf else due)
-        if (contact := person.contact) != self._contacts.get(id):
-            self._contacts[id] = self._new_contacts[id] = contact
+        person.settle(part)
+        self.agenda.set(id, None if person.due == inf else person.due)
+        if person.contact != self._contacts.get(id):
+            self._contacts[id] = self._new_contacts[id] = person.contact
         if presence.here is not (id in self._here) or presence.reported is not (id in scene.found):
             self._comes_or_goes(person)
 
@@ -280,9 +276,9 @@ class People:
 def _answered_by_other(taken_up: TakenUp, asked: PersonRecognition) -> None:
     """Tell the person who was asked that somebody else has answered."""
     _, by, action, at = taken_up
-    asked.talk.take_early(at, lambda talk: talk.pair.other_answers(by, action, at))
+    asked.talk.take_early(at, lambda talk: talk.exchange.pair.other_answers(by, action, at))
 
 
 def _answered_for_all(answered: OngoingEvent, at: Seconds, asked: PersonRecognition) -> None:
     """Tell a person that the robot's question to several people, maybe to this one, has been answered."""
-    asked.talk.take_early(at, lambda talk: talk.pair.answered_for_all(answered, at))
+    asked.talk.take_early(at, lambda talk: talk.exchange.pair.answered_for_all(answered, at))

@@ -2,7 +2,7 @@
 
 from math import inf
 from operator import attrgetter
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from engage_hri.schemas.behaviors import EVENT_KINDS, Action, EventKind
 from engage_hri.schemas.perception import ActionBegan, ActionEnded
@@ -13,7 +13,7 @@ from engage_hri.services.recognition.events.history import ActionHistory
 from engage_hri.services.recognition.events.kinds import KindRecognizer, own_recognizer
 from engage_hri.services.recognition.events.machine import EventWriter
 from engage_hri.services.recognition.events.presence import FacePresence
-from engage_hri.services.recognition.events.scene import GazeState, SessionScene
+from engage_hri.services.recognition.events.scene import SessionScene
 from engage_hri.services.recognition.events.talk import Talk
 
 LONGEST_SPEECH: Seconds = 60.0
@@ -26,6 +26,9 @@ ACTIONS_KEPT = 64
 """Number of actions of each person for which it is remembered when they last began and ended."""
 
 
+Part = Literal["all", "looks", "rest"]
+"""What of a person a step may change: all, the look and the gaze events, or the rest; presence with any of these.
+Most of what people do is looking about, and concerns nothing else."""
 _is_under_way = attrgetter("is_under_way")
 
 
@@ -56,66 +59,48 @@ class PersonRecognition:
             kind: shared.get(kind) or own_recognizer(kind)(id, scene, config, writer) for kind in EVENT_KINDS
         }
         self._recognizers = tuple(dict.fromkeys(self._by_kind.values()))
-        self._others = tuple(each for each in self._recognizers if each is not self.gazes)
+        self._rest = tuple(each for each in self._recognizers if each is not self.gazes)
         """Recognizers of which looks are no part."""
         self.history = ActionHistory(ACTIONS_KEPT)
         self._doing: dict[Action, _Doing] = {}
         """Present actions other than looking."""
-        self._looks_due = self._others_due = inf
-        """Times of the next steps due by themselves: of presence and looks, and of all the rest."""
+        self.due: Seconds = inf
+        """Time of the next step that is due by itself, unless an input comes before; then call `pass_time`."""
+        self.contact: Probability | None = None
+        """Contact with the robot now, from 0 to 1; None: nobody has told where the person looks."""
+        self._looks_due = self._rest_due = inf
+        self._looks_touch = self._rest_touches = False
+        """True if the person is in contact with the robot by looks, or by all the rest."""
         self._scene = scene
-
-    @property
-    def gaze(self) -> GazeState:
-        """Look of the person."""
-        return self.gazes.gaze
 
     # -- time ---------------------------------------------------------------------------------------------------
 
-    @property
-    def deadline(self) -> Seconds:
-        """Time of the next step that is due by itself, unless an input comes before; then call `pass_time`."""
-        looks, others = self._looks_due, self._others_due
-        return looks if looks < others else others
-
-    def note_deadlines(self, *, by_look: bool) -> Seconds:
-        """Note when steps are due, after an input; return the `deadline`. by_look: only looks and presence changed.
-
-        Most of what people do is looking about, and asks for nothing else.
-        """
-        due, gaze = self.presence.deadline, self.gazes.gaze
-        if gaze.targets:
-            due = min(due, self.gazes.look_directs_at if gaze.ended == inf else gaze.deadline)
-        self._looks_due = min(due, self.gazes.deadline)
-        if not by_look:
-            due = inf
-            for each in self._others:
-                if (at := each.deadline) < due:
-                    due = at
-            for doing in self._doing.values():
-                if doing.until < due:
-                    due = doing.until
-            self._others_due = due
-        return self.deadline
+    def settle(self, part: Part) -> None:
+        """Bring `due` and `contact` up to date after a step that may have changed this part of the person."""
+        presence, gaze = self.presence, self.gazes.gaze
+        if part != "rest":
+            self._looks_due, self._looks_touch = self.gazes.deadline, self.gazes.is_in_contact
+            if gaze.targets:
+                at = self.gazes.look_directs_at if gaze.ended == inf else gaze.deadline
+                self._looks_due = min(at, self._looks_due)
+        if part != "looks":
+            self._rest_due = min([each.deadline for each in self._rest] + [one.until for one in self._doing.values()])
+            self._rest_touches = any([each.is_in_contact for each in self._rest])
+        self.due = min(presence.deadline, self._looks_due, self._rest_due)
+        if presence.here and (self._looks_touch or self._rest_touches):
+            self.contact = 1.0
+        else:
+            self.contact = None if gaze.since == 0.0 and not gaze.targets else 0.0
 
     @property
     def is_involved(self) -> bool:
         """True if anything goes on between the person and the robot that the robot's deeds may change."""
         return any(map(_is_under_way, self._recognizers))
 
-    @property
-    def contact(self) -> Probability | None:
-        """Contact with the robot now, from 0 to 1; None: nobody has told where the person looks."""
-        if self.presence.here:
-            for each in self._recognizers:
-                if each.is_in_contact:
-                    return 1.0
-        return None if self.gaze.since == 0.0 and not self.gaze.targets else 0.0
-
     def pass_time(self, at: Seconds) -> None:
         """Take the first step that is due at `at`. There is none if something that all share has put it off."""
-        if self.gaze.deadline == at:
-            self.gaze_changed(self.gaze.expire())
+        if self.gazes.gaze.deadline == at:
+            self.gaze_changed(self.gazes.gaze.expire())
         elif self.presence.deadline == at:
             self.leave(at)
         elif (due := next((each for each in self._recognizers if each.deadline == at), None)) is not None:
@@ -141,7 +126,7 @@ class PersonRecognition:
         action = began.action
         if action == "look":
             was_on_face = self.gazes.on_robots_face
-            if self.gaze.begin(began.targets, at, began.confidence, one_of=began.one_of):
+            if self.gazes.gaze.begin(began.targets, at, began.confidence, one_of=began.one_of):
                 self.gaze_changed(at)
                 if not was_on_face:
                     self.gazes.seeks_face(at)
@@ -170,11 +155,11 @@ class PersonRecognition:
         self.history.is_new(began, since)  # its beginning is no news any more
         action, targets = began.action, began.targets
         if action == "look":
-            if self.gaze.targets and since < self.gaze.since:
+            if self.gazes.gaze.targets and since < self.gazes.gaze.since:
                 return  # there is a newer one
-            since = max(since, self.gaze.since)
-            if self.gaze.begin(targets, since, began.confidence, one_of=began.one_of):
-                self.gaze.spent = True
+            since = max(since, self.gazes.gaze.since)
+            if self.gazes.gaze.begin(targets, since, began.confidence, one_of=began.one_of):
+                self.gazes.gaze.spent = True
                 self.gaze_changed(since)
         elif action not in self._doing:
             self._note(began, since, at)
@@ -184,7 +169,7 @@ class PersonRecognition:
         if not self.history.is_new(ended, at):
             return
         if ended.action == "look":
-            self.gaze.end(ended.targets, at)
+            self.gazes.gaze.end(ended.targets, at)
             return
         doing = self._doing.get(ended.action)
         if doing is not None and at >= doing.since and (not ended.targets or ended.targets == doing.targets):

@@ -93,7 +93,7 @@ class Talk(KindRecognizer):
 
     def may_answer_before(self, answered: Answered) -> bool:
         """True if the person has answered the same turn of the robot, too, or may have, and has begun before."""
-        pair, sign = self._conversation.pair, self._conversation.listener.sign
+        pair, sign = self._conversation.exchange.pair, self._conversation.listener.sign
         is_asked = pair.is_turn(answered.event.turn)
         since = [at for at, _ in islice(self._line, 1)]
         if is_asked:
@@ -391,7 +391,7 @@ class Talk(KindRecognizer):
 
     def robot_begins(self, began: ActionBegan, at: Seconds) -> None:
         if began.action == "speak" and not self._scene.is_listening(began.behavior):
-            self.take(at, lambda talk: talk.pair.forget_unanswered(at))
+            self.take(at, lambda talk: talk.exchange.pair.forget_unanswered(at))
 
     def robot_stops(self, action: Action, at: Seconds) -> None:
         if not self.is_under_way:
