@@ -110,10 +110,16 @@ class Gazes(KindRecognizer):
         return faces[0] if faces and not (self.gaze.one_of and len(faces) > 1) else ""
 
     def gaze_changed(self, at: Seconds) -> None:
+        if self.is_under_way:
+            self._goes_on(at)
+        self.hands_changed()
+
+    def _goes_on(self, at: Seconds) -> None:
+        """Tell the events under way where both look now."""
         sureness = self.gaze.sureness
-        robot_on = self._scene.robot_looks_at((self.id,))
-        confidence = sureness((self._scene.robot,))
-        self.facial.gazes(robot_on=robot_on, human_on=self.on_robots_face, at=at, confidence=confidence)
+        if self.facial.event is not None:
+            robot_on, confidence = self._scene.robot_looks_at((self.id,)), sureness((self._scene.robot,))
+            self.facial.gazes(robot_on=robot_on, human_on=self.on_robots_face, at=at, confidence=confidence)
         for one in self.directed:
             human_on = self._scene.person_looks_at(self.gaze, one.objects)
             if human_on and one.event is not None and one.event.cause != "human":
@@ -124,7 +130,6 @@ class Gazes(KindRecognizer):
         for past in self._robot_directed:
             if self._scene.person_looks_at(self.gaze, past.objects) and self._is_recent(past, at):
                 self.gaze.spent = True
-        self.hands_changed()
 
     def hands_changed(self) -> None:
         """Mark a look that goes with the person's own hand, which may move a hidden piece: it directs nothing."""

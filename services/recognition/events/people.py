@@ -31,9 +31,8 @@ class People:
         self._unseen: dict[str, Seconds] = {}
         """Time of the last sign of each person who has gone or is not reported as present. The longest ago first."""
         self._met = 0
-        self._unknown: dict[str, Seconds] = {}
-        self._asked: dict[str, Seconds] = {}
-        """`scene.unknown` and `scene.asked` when the deadlines of those who were asked were last updated."""
+        self._may_go_on = False
+        """True if `scene.unknown` or `scene.asked` has changed since those were asked whether their talk goes on."""
         self._contacts: dict[str, Probability | None] = {}
         """Contact of each person with the robot."""
         self._new_contacts: dict[str, Probability | None] = {}
@@ -93,6 +92,7 @@ class People:
         self._here.pop(id, None)
         self._unseen.pop(id, None)
         self._scene.forget_person(id)
+        self._may_go_on = True
         self._contacts.pop(id, None)
         self._new_contacts.pop(id, None)
         del self.persons[id]
@@ -181,11 +181,11 @@ class People:
         scene = self._scene
         if scene.taken_up or self._writer.answered:
             self._tell_taken_up(at)
-        while self._unknown != scene.unknown or self._asked != scene.asked:
-            self._unknown, self._asked = {**scene.unknown}, {**scene.asked}
+        while self._may_go_on:
+            self._may_go_on, unknown = False, {**scene.unknown}
             for id in [*scene.questions]:
                 self._update(self.persons[id])
-            for id in sorted(self._unknown, key=lambda id: scene.place(id, self._unknown[id])):
+            for id in sorted(unknown, key=lambda id: scene.place(id, unknown[id])):
                 if self.persons[id].talk.may_go_on(at):
                     self._apply(self.persons[id], at, lambda person: person.talk.go_on(at))
                     self._tell_taken_up(at)
@@ -206,7 +206,7 @@ class People:
             if any(person.talk.may_answer_before(answered[first]) for person in self.persons.values()):
                 return
             told = partial(_answered_for_all, *answered.pop(first))
-            self._unknown = {}  # what has waited for it goes on
+            self._may_go_on = True  # what has waited for it
             for person in list(self.persons.values()):  # who has left meanwhile was asked, too
                 self._apply(person, at, told)
 
@@ -234,10 +234,12 @@ class People:
             asked_since = person.talk.asked_since
             if asked_since < inf or id in scene.asked:
                 self._asks(person, asked_since)
-            if (since := person.talk.undecided_since) is not None:
-                scene.unknown[id] = since
-            elif scene.unknown:
-                scene.unknown.pop(id, None)
+            if (since := person.talk.undecided_since) != scene.unknown.get(id):
+                self._may_go_on = True
+                if since is not None:
+                    scene.unknown[id] = since
+                else:
+                    del scene.unknown[id]
         person.settle(part)
         self.agenda.set(id, None if person.due == inf else person.due)
         if person.contact != self._contacts.get(id):
@@ -252,6 +254,7 @@ class People:
             scene.questions[id] = question
         else:
             scene.questions.pop(id, None)
+        self._may_go_on = self._may_go_on or scene.asked.get(id, inf) != since
         if since < inf:
             scene.asked[id] = since
         else:

@@ -84,8 +84,12 @@ class PersonRecognition:
                 at = self.gazes.look_directs_at if gaze.ended == inf else gaze.deadline
                 self._looks_due = min(at, self._looks_due)
         if part != "looks":
-            self._rest_due = min([each.deadline for each in self._rest] + [one.until for one in self._doing.values()])
-            self._rest_touches = any([each.is_in_contact for each in self._rest])
+            self._rest_due, self._rest_touches = inf, False
+            for each in self._rest:
+                self._rest_due = min(each.deadline, self._rest_due)
+                self._rest_touches = self._rest_touches or each.is_in_contact
+            for doing in self._doing.values():
+                self._rest_due = min(doing.until, self._rest_due)
         self.due = min(presence.deadline, self._looks_due, self._rest_due)
         if presence.here and (self._looks_touch or self._rest_touches):
             self.contact = 1.0
@@ -196,7 +200,8 @@ class PersonRecognition:
 
     def gaze_changed(self, at: Seconds) -> None:
         """Take a change of the person's gaze."""
-        self.talk.looks_at(self.gazes.face, at)
+        if self.talk.is_in_line:
+            self.talk.looks_at(self.gazes.face, at)
         self.gazes.gaze_changed(at)
 
     # -- the robot ----------------------------------------------------------------------------------------------

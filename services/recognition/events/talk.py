@@ -74,6 +74,11 @@ class Talk(KindRecognizer):
         return self.speech is not None and self.speech.is_to(self._scene.robot)
 
     @property
+    def is_in_line(self) -> bool:
+        """True if something of the talk is not told yet."""
+        return bool(self._line)
+
+    @property
     def question(self) -> Question | None:
         """The robot's question that waits for the person's answer, as far as is known; None: none does."""
         question = self._conversation.exchange.pair.question
@@ -145,7 +150,7 @@ class Talk(KindRecognizer):
 
     def looks_at(self, face: str, at: Seconds) -> None:
         """Take a look at a face, or away from all ("")."""
-        for speech in self._undecided if self._line else ():
+        for speech in self._undecided:
             if speech.until is None:
                 speech.faces.turns(face, at)
                 self._may_interrupt(speech, face, at)
@@ -436,8 +441,9 @@ class Talk(KindRecognizer):
     def _is_behind_others(self) -> bool:
         """True if the first in line waits until it is known whether somebody else has answered before."""
         since, (at, first) = self.undecided_since, self._line[0]
-        if any(each.began <= at and not self.may_answer_before(each) for each in self._writer.answered):
-            return True  # it is to be told first that this has answered for all
+        for each in self._writer.answered:
+            if each.began <= at and not self.may_answer_before(each):
+                return True  # it is to be told first that this has answered for all
         if since is None or isinstance(first, CutOff):
             return since is not None and self._scene.is_contested(self.id, since)
         return self._waits_for_others(since)
