@@ -79,15 +79,15 @@ class PersonRecognition:
         """Bring `due` and `contact` up to date after a step that may have changed this part of the person."""
         presence, gaze = self.presence, self.gazes.gaze
         if part != "rest":
-            self._looks_due, self._looks_touch = self.gazes.deadline, self.gazes.is_in_contact
+            self._looks_due, self._looks_touch = self.gazes.outlook()
             if gaze.targets:
                 at = self.gazes.look_directs_at if gaze.ended == inf else gaze.deadline
                 self._looks_due = min(at, self._looks_due)
         if part != "looks":
             self._rest_due, self._rest_touches = inf, False
             for each in self._rest:
-                self._rest_due = min(each.deadline, self._rest_due)
-                self._rest_touches = self._rest_touches or each.is_in_contact
+                due, touches = each.outlook()
+                self._rest_due, self._rest_touches = min(due, self._rest_due), touches or self._rest_touches
             for doing in self._doing.values():
                 self._rest_due = min(doing.until, self._rest_due)
         self.due = min(presence.deadline, self._looks_due, self._rest_due)
@@ -107,7 +107,7 @@ class PersonRecognition:
             self.gaze_changed(self.gazes.gaze.expire())
         elif self.presence.deadline == at:
             self.leave(at)
-        elif (due := next((each for each in self._recognizers if each.deadline == at), None)) is not None:
+        elif (due := next((each for each in self._recognizers if each.outlook()[0] == at), None)) is not None:
             due.pass_time(at)
         elif self.gazes.look_directs_at == at:
             self.gazes.look_directs(at)

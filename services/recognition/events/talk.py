@@ -69,11 +69,6 @@ class Talk(KindRecognizer):
         """The person's latest speeches, by their starts."""
 
     @property
-    def is_in_contact(self) -> bool:
-        """True while the person says something that is known to be for the robot."""
-        return self.speech is not None and self.speech.is_to(self._scene.robot)
-
-    @property
     def is_in_line(self) -> bool:
         """True if something of the talk is not told yet."""
         return bool(self._line)
@@ -87,8 +82,9 @@ class Talk(KindRecognizer):
     @property
     def undecided_since(self) -> Seconds | None:
         """Start of the first of what the person says of which it is not known whether it is for the robot."""
-        beside = self._conversation.listener.beside_since
-        return beside if beside is not None or not self._line else self._line[0][0]
+        listener = self._conversation.listener
+        beside = None if listener.sign is None else listener.beside_since
+        return self._line[0][0] if beside is None and self._line else beside
 
     @property
     def asked_since(self) -> Seconds:
@@ -114,12 +110,13 @@ class Talk(KindRecognizer):
 
     # -- time ---------------------------------------------------------------------------------------------------
 
-    @property
-    def deadline(self) -> Seconds:
+    def outlook(self) -> tuple[Seconds, bool]:
+        """See `KindRecognizer`. Contact is what the person says that is known to be for the robot."""
+        in_contact = self.speech is not None and self.speech.is_to(self._scene.robot)
         if not self._line:
-            return self._conversation.deadline
-        speech = self._undecided_first
-        return inf if speech is None else self._decided_at(speech)
+            return self._conversation.deadline, in_contact
+        first = self._undecided_first
+        return inf if first is None else self._decided_at(first), in_contact
 
     def pass_time(self, at: Seconds) -> None:
         if self._line:
