@@ -44,7 +44,7 @@ class Conversation:
     @property
     def deadline(self) -> Seconds:
         """Time of the next step that is due by itself; infinite: there is none."""
-        due = inf if self.exchange.pair.event is None else self._pair_deadline
+        due = inf if self.exchange.pair.event is None else self._pair_deadline()
         if self.listener.sign is not None or self.robot_backchannel.event is not None:
             due = min(due, self.listener.deadline, self.robot_backchannel.deadline)
         return due
@@ -58,7 +58,6 @@ class Conversation:
         else:
             self.exchange.pair.expire(at)
 
-    @property
     def _pair_deadline(self) -> Seconds:
         """Deadline of the pair; infinite while speech of anybody that began in time may yet be part of it."""
         pair, sign = self.exchange.pair, self.listener.sign
@@ -118,14 +117,16 @@ class Conversation:
         if not self.exchange.is_before_question(at):
             self.exchange.human_turn("speak", at, speech.confidence)
             if self.robot_speaks_since is not None and at < self.robot_speaks_since:
-                self.exchange.pair.robot_begins("speak", self.robot_speaks_since)  # what the robot says now is the answer
+                self.exchange.pair.robot_begins(
+                    "speak", self.robot_speaks_since
+                )  # what the robot says now is the answer
         self._turned_at = at
 
     def falls_silent(self, at: Seconds) -> None:
         if self._speech is None:
             return
         self._speech.until, self._speech = at, None
-        self._ends("speak", at)
+        self.action_ends("speak", at)
         self._floor_is_free(at)
 
     def gestures(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> None:
@@ -139,10 +140,6 @@ class Conversation:
             self.exchange.pair.answers_late(action, at, confidence)
 
     def action_ends(self, action: Action, at: Seconds) -> None:
-        """Take the end of a gesture, or of a manipulation."""
-        self._ends(action, at)
-
-    def _ends(self, action: Action, at: Seconds) -> None:
         """End an action of the person for the sign that it is part of, and for the pairs."""
         self.listener.ends(action, at)
         self.exchange.ends(action, at, by_robot=False)

@@ -41,7 +41,7 @@ class Gazes(KindRecognizer):
         self._robot_directed: list[_Directed] = []
 
     def outlook(self) -> tuple[Seconds, bool]:
-        due, in_contact = inf, self.on_robots_face
+        due, in_contact = inf, self._scene.robot in self.gaze.targets
         for machine in self._machines():
             if machine.event is not None:
                 due, in_contact = min(machine.deadline, due), in_contact or machine.is_shared
@@ -60,7 +60,6 @@ class Gazes(KindRecognizer):
         """True if a gaze event goes on, or the robot has just directed the person's gaze."""
         return self.facial.event is not None or bool(self.directed or self._robot_directed)
 
-    @property
     def look_directs_at(self) -> Seconds:
         """Time at which the person's look has lasted long enough to direct the robot's; infinite if it does not."""
         gaze = self.gaze

@@ -7,6 +7,7 @@ while, in case they come back.
 from collections.abc import Callable
 from functools import partial
 from math import inf
+from typing import TypeVar
 
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
@@ -16,6 +17,7 @@ from engage_hri.services.recognition.events.machine import EventWriter, Mishap, 
 from engage_hri.services.recognition.events.person import Part, PersonRecognition
 from engage_hri.services.recognition.events.scene import SessionScene, TakenUp
 
+Value = TypeVar("Value")
 Step = Callable[[PersonRecognition], object]
 
 
@@ -147,7 +149,7 @@ class People:
         self.apply(id, at, lambda person: person.pass_time(at))
 
     def observe(self, id: str, at: Seconds, step: Step, part: Part = "all") -> None:
-        """Apply a step that an observation of one person asks for; the person may be new. part: that it may change."""
+        """Apply a step that an observation asks for, to a person who may be new. part: what it may change."""
         person = self.person(id)
         self._apply(person, at, step, part)
         self._follow(at)
@@ -155,7 +157,7 @@ class People:
             self._note(person, at)
 
     def apply(self, id: str, at: Seconds, step: Step, part: Part = "all") -> None:
-        """Apply a step to one person. part: that it may change."""
+        """Apply a step to one person. part: what it may change."""
         self._apply(self.persons[id], at, step, part)
         self._follow(at)
 
@@ -166,7 +168,7 @@ class People:
         part: Part = "all",
         where: Callable[[PersonRecognition], object] = lambda person: True,
     ) -> None:
-        """Apply a step to all who are here. part: that it may change. where: tells for whom it may change something."""
+        """Apply a step to all who are here. part: what it may change. where: for whom it does."""
         for person in [person for person in self._here.values() if where(person)]:
             self._apply(person, at, step, part)
         self._follow(at)
@@ -213,11 +215,11 @@ class People:
     def _looks_may_direct(self, at: Seconds) -> None:
         """Update the deadlines of those whose looks may direct the robot's now, for what all share has changed."""
         for person in list(self._here.values()):
-            if person.gazes.look_directs_at < inf:
+            if person.gazes.look_directs_at() < inf:
                 self._apply(person, at, lambda person: None, "looks")
 
     def _apply(self, person: PersonRecognition, at: Seconds, step: Step, part: Part = "all") -> None:
-        """Apply a step to one person; a bug that shows in it does not affect the others. part: that it may change."""
+        """Apply a step to one person; a bug that shows in it does not affect the others. part: what it may change."""
         try:
             step(person)
             self._update(person, part)
@@ -233,32 +235,15 @@ class People:
         if part != "looks":
             asked_since = person.talk.asked_since
             if asked_since < inf or id in scene.asked:
-                self._asks(person, asked_since)
-            if (since := person.talk.undecided_since) != scene.unknown.get(id):
-                self._may_go_on = True
-                if since is not None:
-                    scene.unknown[id] = since
-                else:
-                    del scene.unknown[id]
+                _keep(scene.questions, id, person.talk.question)
+                self._may_go_on |= _keep(scene.asked, id, asked_since if asked_since < inf else None)
+            self._may_go_on |= _keep(scene.unknown, id, person.talk.undecided_since)
         person.settle(part)
         self.agenda.set(id, None if person.due == inf else person.due)
         if person.contact != self._contacts.get(id):
             self._contacts[id] = self._new_contacts[id] = person.contact
         if presence.here is not (id in self._here) or presence.reported is not (id in scene.found):
             self._comes_or_goes(person)
-
-    def _asks(self, person: PersonRecognition, since: Seconds) -> None:
-        """Note since when the robot asks the person, and the question if it waits for the answer."""
-        id, scene, question = person.id, self._scene, person.talk.question
-        if question is not None:
-            scene.questions[id] = question
-        else:
-            scene.questions.pop(id, None)
-        self._may_go_on = self._may_go_on or scene.asked.get(id, inf) != since
-        if since < inf:
-            scene.asked[id] = since
-        else:
-            scene.asked.pop(id, None)
 
     def _comes_or_goes(self, person: PersonRecognition) -> None:
         """Note whether the person is here, and whether that is reported."""
@@ -274,6 +259,16 @@ class People:
             scene.present.add(id)
             person.talk.person_back()
             self._here = dict(sorted(self._here.items(), key=lambda one: one[1].number))
+
+
+def _keep(kept: dict[str, Value], id: str, value: Value | None) -> bool:
+    """Keep what is known of a person; None: nothing. True if that is a change."""
+    before = kept.get(id)
+    if value is not None:
+        kept[id] = value
+    elif before is not None:
+        del kept[id]
+    return value != before
 
 
 def _answered_by_other(taken_up: TakenUp, asked: PersonRecognition) -> None:

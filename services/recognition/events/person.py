@@ -1,5 +1,6 @@
 """One person and the robot: what each does becomes input of the recognizers of all kinds of events between them."""
 
+from collections.abc import Callable
 from math import inf
 from operator import attrgetter
 from typing import Literal, NamedTuple
@@ -16,12 +17,10 @@ from engage_hri.services.recognition.events.presence import FacePresence
 from engage_hri.services.recognition.events.scene import SessionScene
 from engage_hri.services.recognition.events.talk import Talk
 
-LONGEST_SPEECH: Seconds = 60.0
-"""Time after which speech is over if no report of its end has come. The next beginning ends it, too. Ours."""
+LONGEST: dict[Action, Seconds] = {"speak": 60.0, "act": 120.0}
+"""Time after which speech or a manipulation is over if no report of its end has come; the next ends it, too. Ours."""
 LONGEST_GESTURE: Seconds = 10.0
 """The same for a nod, a shake, a point, and any other action. Ours."""
-LONGEST_MANIPULATION: Seconds = 120.0
-"""The same for a manipulation. Ours."""
 ACTIONS_KEPT = 64
 """Number of actions of each person for which it is remembered when they last began and ended."""
 
@@ -29,7 +28,7 @@ ACTIONS_KEPT = 64
 Part = Literal["all", "looks", "rest"]
 """What of a person a step may change: all, the look and the gaze events, or the rest; presence with any of these.
 Most of what people do is looking about, and concerns nothing else."""
-_is_under_way = attrgetter("is_under_way")
+_is_under_way, _until = attrgetter("is_under_way"), attrgetter("until")
 
 
 class _Doing(NamedTuple):
@@ -77,21 +76,19 @@ class PersonRecognition:
 
     def settle(self, part: Part) -> None:
         """Bring `due` and `contact` up to date after a step that may have changed this part of the person."""
-        presence, gaze = self.presence, self.gazes.gaze
+        gaze = self.gazes.gaze
         if part != "rest":
-            self._looks_due, self._looks_touch = self.gazes.outlook()
+            due, self._looks_touch = self.gazes.outlook()
             if gaze.targets:
-                at = self.gazes.look_directs_at if gaze.ended == inf else gaze.deadline
-                self._looks_due = min(at, self._looks_due)
+                due = min(due, self.gazes.look_directs_at() if gaze.ended == inf else gaze.deadline)
+            self._looks_due = due
         if part != "looks":
-            self._rest_due, self._rest_touches = inf, False
+            self._rest_due, self._rest_touches = min(map(_until, self._doing.values()), default=inf), False
             for each in self._rest:
                 due, touches = each.outlook()
                 self._rest_due, self._rest_touches = min(due, self._rest_due), touches or self._rest_touches
-            for doing in self._doing.values():
-                self._rest_due = min(doing.until, self._rest_due)
-        self.due = min(presence.deadline, self._looks_due, self._rest_due)
-        if presence.here and (self._looks_touch or self._rest_touches):
+        self.due = min(self.presence.deadline, self._looks_due, self._rest_due)
+        if self.presence.here and (self._looks_touch or self._rest_touches):
             self.contact = 1.0
         else:
             self.contact = None if gaze.since == 0.0 and not gaze.targets else 0.0
@@ -109,7 +106,7 @@ class PersonRecognition:
             self.leave(at)
         elif (due := next((each for each in self._recognizers if each.outlook()[0] == at), None)) is not None:
             due.pass_time(at)
-        elif self.gazes.look_directs_at == at:
+        elif self.gazes.look_directs_at() == at:
             self.gazes.look_directs(at)
         else:
             self._end_overlong(at)
@@ -146,7 +143,7 @@ class PersonRecognition:
     def _note(self, began: ActionBegan, since: Seconds, at: Seconds) -> None:
         """Note an action of the person that goes on. at: time from which on its end is waited for."""
         action = began.action
-        self._doing[action] = _Doing(began.targets, since, at + self._longest(action))
+        self._doing[action] = _Doing(began.targets, since, at + LONGEST.get(action, LONGEST_GESTURE))
         if action == "speak":
             self._scene.speaks(self.id)
         elif action == "act":
@@ -188,11 +185,6 @@ class PersonRecognition:
         for each in self._recognizers:
             each.stops(action, at)
 
-    def _longest(self, action: Action) -> Seconds:
-        if action == "speak":
-            return LONGEST_SPEECH
-        return LONGEST_MANIPULATION if action == "act" else LONGEST_GESTURE
-
     def _end_overlong(self, at: Seconds) -> None:
         """End actions with a lost end and no later beginning."""
         for action in [action for action, one in self._doing.items() if one.until <= at]:
@@ -206,29 +198,16 @@ class PersonRecognition:
 
     # -- the robot ----------------------------------------------------------------------------------------------
 
-    def robot_begins(self, began: ActionBegan, at: Seconds) -> None:
+    def tell(self, step: Callable[[KindRecognizer], None]) -> None:
+        """Tell all recognizers what the robot does."""
         for each in self._recognizers:
-            each.robot_begins(began, at)
-
-    def robot_stops(self, action: Action, at: Seconds) -> None:
-        for each in self._recognizers:
-            each.robot_stops(action, at)
+            step(each)
 
     def recognizer(self, kind: EventKind) -> KindRecognizer:
         """Recognizer of the events of this kind."""
         return self._by_kind[kind]
 
-    def point_realised(self, block: str, name: str, at: Seconds) -> None:
-        """Take a realised sync point of a block of the robot: time limits may run from there."""
-        for each in self._recognizers:
-            each.point_realised(block, name, at)
-
     def abort(self, at: Seconds, *, turn: str) -> None:
         """End the events that the robot began in a turn that was cut off: what was said, then what was shown."""
         for each in reversed(self._recognizers):
             each.abort(at, turn=turn)
-
-    def block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
-        """Take the end of a block of the robot."""
-        for each in self._recognizers:
-            each.block_ended(block, at, aborted=aborted)

@@ -20,7 +20,7 @@ from engage_hri.schemas.fragments import HeadOwner
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, TurnOutcome
 from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused
-from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.addressing import WHOEVER, WORDS_AFTER, Addressees, Spoken, renamed_in
@@ -39,8 +39,9 @@ WORDS_PATIENCE: Seconds = 10.0
 0065."""
 ACCEPT: tuple[Action, ...] = ("speak", "nod", "shake", "point")
 """Actions that answer an adjacency pair of the robot, unless its request names others. Thesis 2.2.3."""
-WITH_HANDS: tuple[Action, ...] = ("point", "act")
-"""Actions that go with looks: they direct the other's, or say what one's own look is at."""
+PARTS: dict[Action, Part] = {"look": "looks", "point": "all", "act": "all"}
+"""What of a person an action may change, of theirs or of the robot; any other only "rest". Hands go with looks: a
+point directs the other's, and who moves a thing looks at it."""
 SETTLING: Seconds = 0.35
 """Longest time for which events wait for raw perception that is undecided.
 Decision 0009."""
@@ -77,6 +78,8 @@ class Session:
         """Persons who are here, or have not been gone for long."""
         self.busy: Set[str] = self.scene.acting
         """Persons with a task in hand."""
+        self.contacts = self._people.contacts
+        """Tells contact with each person for whom it has changed since the last call."""
         self._ended_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
         self._aborted_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
         self._robot_actions: dict[tuple[str, Action], ActionBegan] = {}
@@ -113,10 +116,6 @@ class Session:
             if person.presence.here and (speech := person.talk.speech) is not None:
                 speeches.append(speech)
         return sorted(speeches, key=lambda each: (each.since, each.actor))
-
-    def contacts(self) -> dict[str, Probability | None]:
-        """Contact with each person for whom it has changed since the last call."""
-        return self._people.contacts()
 
     # -- time ---------------------------------------------------------------------------------------------------
 
@@ -158,14 +157,16 @@ class Session:
             self._robot_begins(began, at)
         else:
             may_be_known = began.action == "look" and began.actor in self.scene.unknown  # to whom the person speaks
-            part = "all" if may_be_known else _part_of(began.action)
+            part = "all" if may_be_known else PARTS.get(began.action, "rest")
             self._people.observe(began.actor, at, lambda person: person.begins(began, at), part)
 
     def _ends(self, ended: ActionEnded, at: Seconds) -> None:
         if ended.actor == self.robot:
             self._robot_ends(ended, at)
         elif ended.actor in self.persons:
-            self._people.observe(ended.actor, at, lambda person: person.ends(ended, at), _part_of(ended.action))
+            self._people.observe(
+                ended.actor, at, lambda person: person.ends(ended, at), PARTS.get(ended.action, "rest")
+            )
 
     def _goes_on(self, observation: GoesOn, at: Seconds) -> None:
         began, since = observation.began, observation.since
@@ -262,17 +263,17 @@ class Session:
             self._robot_looks(began.targets, at)
             return
         self._robot_actions[began.behavior, began.action] = began
+        listens = self.scene.is_listening(began.behavior)
         match began.action:
             case "speak":
                 self._heard_at = None
                 if self.scene.robot_speaks_since is None:
                     self._robot_speaks(began, at)
-                    listens = self.scene.is_listening(began.behavior)
                     self._say(began, at, lambda talk: talk.robot_speaks(at, listens=listens))
             case "nod" | "shake" | "point":
-                listens = self.scene.is_listening(began.behavior)
                 self._say(began, at, lambda talk: talk.robot_gestures(began.action, at, listens=listens))
-        self._people.apply_to_all(at, lambda person: person.robot_begins(began, at), _part_of(began.action))
+        part = PARTS.get(began.action, "rest")
+        self._people.apply_to_all(at, lambda person: person.tell(lambda kind: kind.robot_begins(began, at)), part)
 
     def _robot_speaks(self, began: ActionBegan, at: Seconds) -> None:
         self.scene.speaks(self.robot)
@@ -335,7 +336,10 @@ class Session:
                 return
             self.scene.robot_falls_silent(at)
         self._people.apply_to_all(
-            at, lambda person: person.robot_stops(action, at), "rest", lambda person: person.is_involved
+            at,
+            lambda person: person.tell(lambda kind: kind.robot_stops(action, at)),
+            "rest",
+            lambda person: person.is_involved,
         )
 
     def _understand(self, words: Worded, at: Seconds) -> None:
@@ -546,7 +550,7 @@ class Session:
     def _apply_to_addressees(
         self, actor: str, at: Seconds, step: Callable[[PersonRecognition], object], part: Part = "all"
     ) -> None:
-        """Apply a step to a known person, or to all (actor: empty). part: that it may change."""
+        """Apply a step to a known person, or to all (actor: empty). part: what it may change."""
         if not actor:
             self._people.apply_to_all(at, step, part)
         elif actor in self.persons:
@@ -560,7 +564,7 @@ class Session:
         block = point.block
         name = self.blocks.realised(block, point.behavior, point.sync, at)
         for id in self._waiting_for(block, name):
-            self._people.apply(id, at, lambda person: person.point_realised(block, name, at))
+            self._people.apply(id, at, lambda person: person.tell(lambda kind: kind.point_realised(block, name, at)))
 
     def _block_progresses(self, told: BlockProgress, at: Seconds) -> None:
         if told.block is not None and told.progress == "start":
@@ -581,19 +585,12 @@ class Session:
         self._robot_stops(at, f"{block}:")
         self._people.apply_to_all(
             at,
-            lambda person: person.block_ended(block, at, aborted=aborted),
+            lambda person: person.tell(lambda kind: kind.block_ended(block, at, aborted=aborted)),
             where=lambda person: person.is_involved,
         )
         answered = self._answering_blocks.pop(block, None)
         if answered is not None:
             self._tell(answered, at, lambda talk: talk.exchange.pair.answered_block_ended(at))
-
-
-def _part_of(action: Action) -> Part:
-    """What of a person this action of the person or the robot may change."""
-    if action == "look":
-        return "looks"
-    return "all" if action in WITH_HANDS else "rest"
 
 
 def _has_gaze_under_way(person: PersonRecognition) -> bool:
