@@ -113,7 +113,7 @@ class Session:
         said = self.scene.robot_spoken
         speeches: list[Spoken] = [] if said is None else [said]
         for person in self.persons.values():
-            if person.presence.here and (speech := person.talk.speech) is not None:
+            if person.presence.here and (speech := person.talk.speeches.going_on) is not None:
                 speeches.append(speech)
         return sorted(speeches, key=lambda each: (each.since, each.actor))
 
