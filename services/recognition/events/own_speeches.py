@@ -25,7 +25,7 @@ SPEECHES_KEPT = 8
 
 
 class OwnSpeeches:
-    """What one person says, and has said lately."""
+    """Speeches of one person: the one that goes on, and the latest."""
 
     def __init__(self, id: str, scene: SessionScene, config: RecognitionConfig, writer: EventWriter) -> None:
         self.going_on: OwnSpeech | None = None
