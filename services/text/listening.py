@@ -6,7 +6,10 @@ such as "well" and "but", nor thanks, with which one ends. What is part of many 
 """
 
 import re
+from functools import lru_cache
 
+TEXTS_KEPT = 64
+"""Number of texts of which is remembered what they are: the words of a speech are judged at each step of the talk."""
 BY_LANGUAGE = {
     "en": "uh-huh, mhm, mm-hmm, mm, hm, huh, uh, uhm, um, er, erm, ah, oh, ooh, aha, yes, yeah, yep, yup, aye, ok, "
     "okay, okey-dokey, right, all right, alright, sure, sure thing, for sure, of course, naturally, "
@@ -38,12 +41,14 @@ BY_LANGUAGE = {
 """Phrases of each language, with commas between them."""
 
 
+@lru_cache(TEXTS_KEPT)
 def is_listening(text: str) -> bool:
     """True if the text has words, and all of them are those of a listener, in whatever language and how often."""
     said = _plain(text)
     return bool(said) and _LISTENER.fullmatch(said) is not None
 
 
+@lru_cache(TEXTS_KEPT)
 def says_words(text: str) -> bool:
     """True if somebody has said a word; a recognizer writes noises as signs or in brackets: "..." or "[laughter]"."""
     return bool(_plain(text))

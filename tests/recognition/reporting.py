@@ -200,8 +200,8 @@ class Stage:
         person = session.persons.get(actor.id)
         if person is None or not person.presence.here:
             return Belief(False)
-        looks = "" if person.gaze.ended < inf else _first(person.gaze.targets)
-        return Belief(True, looks, person.talk.speech is not None, actor.id in session.busy)
+        looks = "" if person.gazes.gaze.ended < inf else _first(person.gazes.gaze.targets)
+        return Belief(True, looks, person.talk.speeches.going_on is not None, actor.id in session.busy)
 
 
 def _first(targets: Iterable[str]) -> str:

@@ -161,7 +161,7 @@ def test_what_is_too_old_or_doubtful_is_ignored():
     ]
 
     assert results == []
-    assert recognizer.session.persons[HUMAN].gaze.targets == ()
+    assert recognizer.session.persons[HUMAN].gazes.gaze.targets == ()
 
 
 def test_a_moved_piece_is_the_same_answer_told_and_filmed():

@@ -18,7 +18,7 @@ from engage_hri.services.recognition.events import people
 from engage_hri.services.recognition.events.gazes import AFTER_ROBOT_DIRECTED, DIRECT_BY_LOOK
 from engage_hri.services.recognition.events.machine import PersonForgotten
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
-from engage_hri.services.recognition.events.person import PersonRecognition
+from engage_hri.services.recognition.events.person import Part, PersonRecognition
 from engage_hri.services.recognition.events.session import Session
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from tests.random_cases import share_of
@@ -174,10 +174,21 @@ def test_what_is_kept_does_not_grow_with_those_who_have_passed(raw: bool):
         assert count <= 1.1 * early[kind] + 40, kind
 
 
-def test_a_step_asks_nobody_who_has_gone(monkeypatch: pytest.MonkeyPatch):
+def asks(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The persons who are asked when they are due, from now on."""
     asked: list[str] = []
-    deadline = PersonRecognition.deadline.fget  # type: ignore[attr-defined]
-    monkeypatch.setattr(PersonRecognition, "deadline", property(lambda self: asked.append(self.id) or deadline(self)))
+    settle = PersonRecognition.settle
+
+    def ask(person: PersonRecognition, part: Part) -> None:
+        asked.append(person.id)
+        settle(person, part)
+
+    monkeypatch.setattr(PersonRecognition, "settle", ask)
+    return asked
+
+
+def test_a_step_asks_nobody_who_has_gone(monkeypatch: pytest.MonkeyPatch):
+    asked = asks(monkeypatch)
     lobby = Lobby(RecognitionConfig())
     for number in range(60):
         asked.clear()
@@ -192,9 +203,7 @@ def test_a_step_asks_nobody_who_has_gone(monkeypatch: pytest.MonkeyPatch):
 
 def test_a_step_asks_no_more_than_one_of_many_who_are_here(monkeypatch: pytest.MonkeyPatch):
     log = Log(*(f"person-{number}" for number in range(50)))
-    asked: list[str] = []
-    deadline = PersonRecognition.deadline.fget  # type: ignore[attr-defined]
-    monkeypatch.setattr(PersonRecognition, "deadline", property(lambda self: asked.append(self.id) or deadline(self)))
+    asked = asks(monkeypatch)
     log.looks("person-7", ROBOT, 1.0)
     log.until(2.0)
 

@@ -85,7 +85,7 @@ def test_the_floor_belongs_to_who_goes_on_speaking():
     log.goes_on(HUMAN, "speak", 20.0, 1.0)
     log.goes_on(ROBOT, "speak", 20.0, 2.0, behavior="block-1:speech-1")
 
-    speech = log.session.persons[HUMAN].talk.speech
+    speech = log.session.persons[HUMAN].talk.speeches.going_on
     assert speech is not None
     assert speech.since == 1.0
     assert log.session.scene.robot_speaks_since == 2.0
@@ -97,12 +97,12 @@ def test_the_longest_time_counts_from_when_it_became_known(action, longest):
     log = Log()
     log.goes_on(HUMAN, action, 500.0, 1.0)
     log.until(500.0 + longest - 0.1)
-    speech = log.session.persons[HUMAN].talk.speech
+    speech = log.session.persons[HUMAN].talk.speeches.going_on
     doing = (speech and speech.since, set(log.session.busy))
     log.until(500.0 + longest)
 
     assert doing in ((1.0, set()), (None, {HUMAN}))
-    assert log.session.persons[HUMAN].talk.speech is None
+    assert log.session.persons[HUMAN].talk.speeches.going_on is None
     assert log.session.busy == set()
 
 

@@ -89,8 +89,7 @@ def believed_wrongly(seed: int, steps: int, **faults: Any) -> list[str]:
     async def play() -> list[str]:
         with pytest.MonkeyPatch.context() as monkeypatch:
             hub = CuttableHub(seed=seed, **faults)
-            for name in ("LONGEST_SPEECH", "LONGEST_MANIPULATION"):
-                monkeypatch.setattr(person, name, 1e6)
+            monkeypatch.setattr(person, "LONGEST", {"speak": 1e6, "act": 1e6})
             async with Running(monkeypatch, hub=hub) as stage:
                 play = Play(stage, random.Random(seed))
                 for _ in range(steps):

@@ -4,6 +4,7 @@ import random
 from collections import Counter
 from contextlib import ExitStack
 from types import ModuleType
+from typing import Any
 from unittest import mock
 
 from hypothesis import given, settings
@@ -24,15 +25,13 @@ PEOPLE = ("ann", "bob")
 CELL = 0.04
 """Within this from each full second things happen, and come in whatever order."""
 CONFIG = RecognitionConfig(manipulation_limit=8.3, adjacency_pair_limit=4.3, third_turn_limit=1.83)
-TIMES: dict[ModuleType, dict[str, float]] = {
+TIMES: dict[ModuleType, dict[str, Any]] = {
     presence: {"FACE_GRACE": 2.3},
     exchange: {"TURN_PATIENCE": 12.3},
     session: {"TURN_PATIENCE": 12.3},
     gazes: {"AFTER_ROBOT_DIRECTED": 2.3},
-    person: {
-        "LONGEST_SPEECH": 60.3, "LONGEST_GESTURE": 10.3, "LONGEST_MANIPULATION": 120.3,
-    },
-}  # fmt: skip
+    person: {"LONGEST": {"speak": 60.3, "act": 120.3}, "LONGEST_GESTURE": 10.3},
+}
 """No limit, nor the time of a lost face, is a number of full seconds: none passes between observations of a cell."""
 
 

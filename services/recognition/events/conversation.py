@@ -11,7 +11,6 @@ from math import inf
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.adjacency_pair import AdjacencyPair
 from engage_hri.services.recognition.events.backchannel import BRIEF, UNDECIDED, Backchannel
 from engage_hri.services.recognition.events.exchange import Exchange
 from engage_hri.services.recognition.events.limits import in_time
@@ -40,17 +39,12 @@ class Dialogue:
         self._config = config
         self._writer = writer
 
-    @property
-    def pair(self) -> AdjacencyPair:
-        """The present pair."""
-        return self.exchange.pair
-
     # -- time ---------------------------------------------------------------------------------------------------
 
     @property
     def deadline(self) -> Seconds:
         """Time of the next step that is due by itself; infinite: there is none."""
-        due = inf if self.exchange.pair.event is None else self._pair_deadline
+        due = inf if self.exchange.pair.event is None else self._pair_deadline()
         if self.listener.sign is not None or self.robot_backchannel.event is not None:
             due = min(due, self.listener.deadline, self.robot_backchannel.deadline)
         return due
@@ -62,9 +56,8 @@ class Dialogue:
         elif self.robot_backchannel.deadline == at:
             self._robot_takes_floor(at)
         else:
-            self.pair.expire(at)
+            self.exchange.pair.expire(at)
 
-    @property
     def _pair_deadline(self) -> Seconds:
         """Deadline of the pair; infinite while speech of anybody that began in time may yet be part of it."""
         pair, sign = self.exchange.pair, self.listener.sign
@@ -80,18 +73,18 @@ class Dialogue:
 
     @property
     def robot_holds_floor(self) -> bool:
-        return self.robot_speaks_since is not None or self.pair.robot_holds_turn
+        return self.robot_speaks_since is not None or self.exchange.pair.robot_holds_turn
 
     def is_into_turn(self, at: Seconds) -> bool:
         """True if what the person does at `at` is in the robot's turn. It may be known only now, and be earlier."""
-        if self.pair.event is not None and self.pair.robot_holds_turn:
-            return at >= self.pair.event.started
+        if self.exchange.pair.event is not None and self.exchange.pair.robot_holds_turn:
+            return at >= self.exchange.pair.event.started
         return self.robot_speaks_since is not None and at >= self.robot_speaks_since
 
     @property
     def is_spoken_to(self) -> bool:
         """True while the robot speaks to the person, or waits for an answer."""
-        return self.robot_holds_floor or self.pair.may_be_answered_with("speak")
+        return self.robot_holds_floor or self.exchange.pair.may_be_answered_with("speak")
 
     @property
     def is_under_way(self) -> bool:
@@ -124,14 +117,16 @@ class Dialogue:
         if not self.exchange.is_before_question(at):
             self.exchange.human_turn("speak", at, speech.confidence)
             if self.robot_speaks_since is not None and at < self.robot_speaks_since:
-                self.pair.robot_begins("speak", self.robot_speaks_since)  # what the robot says now is the answer
+                self.exchange.pair.robot_begins(
+                    "speak", self.robot_speaks_since
+                )  # what the robot says now is the answer
         self._turned_at = at
 
     def falls_silent(self, at: Seconds) -> None:
         if self._speech is None:
             return
         self._speech.until, self._speech = at, None
-        self._ends("speak", at)
+        self.action_ends("speak", at)
         self._floor_is_free(at)
 
     def gestures(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> None:
@@ -141,14 +136,10 @@ class Dialogue:
             return  # it goes with the person's own words, and says nothing more
         if self.robot_holds_floor or (sign is not None and sign.until is None):
             self.listener.begins(SignPart(action, at, confidence))
-        elif not self.pair.human_begins(action, at, confidence):
-            self.pair.answers_late(action, at, confidence)
+        elif not self.exchange.pair.human_begins(action, at, confidence):
+            self.exchange.pair.answers_late(action, at, confidence)
 
     def action_ends(self, action: Action, at: Seconds) -> None:
-        """Take the end of a gesture, or of a manipulation."""
-        self._ends(action, at)
-
-    def _ends(self, action: Action, at: Seconds) -> None:
         """End an action of the person for the sign that it is part of, and for the pairs."""
         self.listener.ends(action, at)
         self.exchange.ends(action, at, by_robot=False)
@@ -178,19 +169,19 @@ class Dialogue:
     def robot_speaks(self, at: Seconds, *, listens: bool) -> None:
         """Take the beginning of the robot's speech. listens: it is a backchannel that was announced."""
         self.robot_speaks_since = self._turned_at = at
-        self.pair.robot_heard(None)
-        if self._speech is not None and not self.pair.robot_holds_turn:
-            if self.robot_backchannel.state != BRIEF and not self.pair.is_cut_into:
+        self.exchange.pair.robot_heard(None)
+        if self._speech is not None and not self.exchange.pair.robot_holds_turn:
+            if self.robot_backchannel.state != BRIEF and not self.exchange.pair.is_cut_into:
                 self.robot_backchannel.speaks(self._robots_backchannel(at))
         elif not listens:
-            self.pair.robot_begins("speak", at)
-            self.pair.forget_unanswered()
+            self.exchange.pair.robot_begins("speak", at)
+            self.exchange.pair.forget_unanswered()
 
     def robot_falls_silent(self, at: Seconds) -> None:
         self.robot_speaks_since = None
         if self.listener.is_beside:
             self.listener.robots_turn_ends(at)
-        self.pair.robot_heard(at)
+        self.exchange.pair.robot_heard(at)
         listening, since = self.robot_backchannel, self.robot_backchannel.undecided_since
         if listening.state == BRIEF or (since is not None and in_time(at, since + self._config.backchannel_limit)):
             listening.ends(at)
@@ -201,7 +192,7 @@ class Dialogue:
         """Take a nod, a shake or a point of the robot. listens: it is a backchannel that was announced."""
         if self._speech is None or action == "point":
             if not listens:
-                self.pair.robot_begins(action, at)
+                self.exchange.pair.robot_begins(action, at)
         elif self.robot_backchannel.state == IDLE:
             self.robot_backchannel.gestures(self._robots_backchannel(at))
 
@@ -209,9 +200,9 @@ class Dialogue:
         """Take speech or a gesture of the robot that goes on, known only now. It may be the answer."""
         if action == "speak":
             self.robot_speaks_since = since
-            self.pair.robot_heard(None)
-        if self.pair.event is not None and since >= self.pair.event.started:
-            self.pair.robot_begins(action, since)
+            self.exchange.pair.robot_heard(None)
+        if self.exchange.pair.event is not None and since >= self.exchange.pair.event.started:
+            self.exchange.pair.robot_begins(action, since)
 
     def robot_gesture_ends(self, action: Action, at: Seconds) -> None:
         if self.robot_backchannel.state == BRIEF and action != "point":
@@ -223,7 +214,7 @@ class Dialogue:
         self._drop_robots_sign(event.started)
         self.exchange.robot_asks(event)
         if self.robot_speaks_since is not None:
-            self.pair.robot_heard(None)
+            self.exchange.pair.robot_heard(None)
 
     def robot_announces(self, event: OngoingEvent, ended: Seconds | None) -> None:
         """Begin the robot's backchannel, unless it has been noticed. ended: when its block was over, if it was."""
@@ -239,13 +230,13 @@ class Dialogue:
     def is_answered(self, at: Seconds, *, repairs: bool) -> None:
         """Take the robot's second turn, or a third one that repairs. Either answers a waiting person."""
         if repairs:
-            self.pair.repaired(at)
+            self.exchange.pair.repaired(at)
         self._drop_robots_sign(at)
-        self.pair.robot_begins("speak", at)
-        self.pair.forget_unanswered()
+        self.exchange.pair.robot_begins("speak", at)
+        self.exchange.pair.forget_unanswered()
 
     def _robot_takes_floor(self, at: Seconds, given: str = "limit") -> None:
-        self.pair.robot_begins("speak", self.robot_backchannel.takes_floor(given, at))
+        self.exchange.pair.robot_begins("speak", self.robot_backchannel.takes_floor(given, at))
 
     def _drop_robots_sign(self, at: Seconds) -> None:
         """Take what the robot says, and might be a backchannel, for a turn: it is known now that it is one."""
@@ -260,14 +251,14 @@ class Dialogue:
     # -- ends of the robot's turn -------------------------------------------------------------------------------
 
     def turn_ended(self, turn: str, at: Seconds) -> None:
-        if self.pair.is_turn(turn):
+        if self.exchange.pair.is_turn(turn):
             self.turn_ends(at)
 
     def turn_ends(self, at: Seconds) -> None:
         # Before the pair is decided: of several answers during the turn the one that began first counts.
         if self.robot_speaks_since is None:
             self.listener.robots_turn_ends(at)
-        self.pair.turn_ends(at)
+        self.exchange.pair.turn_ends(at)
         self._floor_is_free(at)
 
     def cut_off(self, at: Seconds, *, turn: str) -> None:
@@ -276,21 +267,21 @@ class Dialogue:
         Who speaks into the turn at that moment has taken the floor, and so has answered, however long the speech was
         until then. Else the limit of a backchannel and the robot's own limit for giving way would be two judges.
         """
-        if self.pair.is_turn(turn):
+        if self.exchange.pair.is_turn(turn):
             self.listener.robots_turn_ends(at, "interruption")
-            if self.pair.is_interrupted:
-                self.pair.turn_ends(at)
+            if self.exchange.pair.is_interrupted:
+                self.exchange.pair.turn_ends(at)
 
     def abort(self, at: Seconds, *, turn: str) -> None:
         """End the pair of a robot's turn that was cut off, which nobody has answered."""
-        if self.pair.is_turn(turn):
-            self.pair.abort(at)
+        if self.exchange.pair.is_turn(turn):
+            self.exchange.pair.abort(at)
         self._floor_is_free(at)
 
     def withdraw(self, event: OngoingEvent, at: Seconds, *, is_orphan: bool) -> None:
         """Withdraw a pair of the robot; see `Talk.withdraw`."""
-        if self.pair.event is event and (self.pair.robot_holds_turn or not is_orphan):
-            self.pair.abort(at)
+        if self.exchange.pair.event is event and (self.exchange.pair.robot_holds_turn or not is_orphan):
+            self.exchange.pair.abort(at)
 
     def block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
         self.exchange.block_ended(block, at, aborted=aborted)

@@ -1,8 +1,6 @@
 """Gaze of one person and the robot: directed gaze, at each set of objects by itself, and mutual facial gaze."""
 
-from collections.abc import Iterator
 from math import inf
-from operator import attrgetter
 from typing import NamedTuple
 
 from engage_hri.schemas.behaviors import Action, Event, EventKind
@@ -32,9 +30,6 @@ class _Directed(NamedTuple):
     at: Seconds
 
 
-_is_shared = attrgetter("is_shared")
-
-
 class Gazes(KindRecognizer):
     """The look of a person, and the gaze events with the robot that come of it."""
 
@@ -45,12 +40,12 @@ class Gazes(KindRecognizer):
         self.directed: list[DirectedGaze] = []
         self._robot_directed: list[_Directed] = []
 
-    @property
-    def deadline(self) -> Seconds:
-        due = inf if self.facial.event is None else self.facial.deadline
-        for one in self.directed:
-            due = min(due, one.deadline)
-        return due
+    def outlook(self) -> tuple[Seconds, bool]:
+        due, in_contact = inf, self._scene.robot in self.gaze.targets
+        for machine in self._machines():
+            if machine.event is not None:
+                due, in_contact = min(machine.deadline, due), in_contact or machine.is_shared
+        return due, in_contact
 
     def pass_time(self, at: Seconds) -> None:
         one = next((one for one in self.directed if one.deadline == at), None)
@@ -65,13 +60,6 @@ class Gazes(KindRecognizer):
         """True if a gaze event goes on, or the robot has just directed the person's gaze."""
         return self.facial.event is not None or bool(self.directed or self._robot_directed)
 
-    @property
-    def is_in_contact(self) -> bool:
-        if self._scene.robot in self.gaze.targets or (self.facial.event is not None and self.facial.is_shared):
-            return True
-        return bool(self.directed) and any(map(_is_shared, self.directed))
-
-    @property
     def look_directs_at(self) -> Seconds:
         """Time at which the person's look has lasted long enough to direct the robot's; infinite if it does not."""
         gaze = self.gaze
@@ -110,10 +98,16 @@ class Gazes(KindRecognizer):
         return faces[0] if faces and not (self.gaze.one_of and len(faces) > 1) else ""
 
     def gaze_changed(self, at: Seconds) -> None:
+        if self.is_under_way:
+            self._goes_on(at)
+        self.hands_changed()
+
+    def _goes_on(self, at: Seconds) -> None:
+        """Tell the events under way where both look now."""
         sureness = self.gaze.sureness
-        robot_on = self._scene.robot_looks_at((self.id,))
-        confidence = sureness((self._scene.robot,))
-        self.facial.gazes(robot_on=robot_on, human_on=self.on_robots_face, at=at, confidence=confidence)
+        if self.facial.event is not None:
+            robot_on, confidence = self._scene.robot_looks_at((self.id,)), sureness((self._scene.robot,))
+            self.facial.gazes(robot_on=robot_on, human_on=self.on_robots_face, at=at, confidence=confidence)
         for one in self.directed:
             human_on = self._scene.person_looks_at(self.gaze, one.objects)
             if human_on and one.event is not None and one.event.cause != "human":
@@ -124,7 +118,6 @@ class Gazes(KindRecognizer):
         for past in self._robot_directed:
             if self._scene.person_looks_at(self.gaze, past.objects) and self._is_recent(past, at):
                 self.gaze.spent = True
-        self.hands_changed()
 
     def hands_changed(self) -> None:
         """Mark a look that goes with the person's own hand, which may move a hidden piece: it directs nothing."""
@@ -238,9 +231,8 @@ class Gazes(KindRecognizer):
             machine.block_ended(block, at, aborted=aborted)
         self._forget_idle(at)
 
-    def _machines(self) -> Iterator[SharedGaze]:
-        yield self.facial
-        yield from self.directed
+    def _machines(self) -> list[SharedGaze]:
+        return [self.facial, *self.directed]
 
     # -- directed gazes that are over ---------------------------------------------------------------------------
 

@@ -21,8 +21,7 @@ class Latest(dict[Key, Value]):
         self._size = size
 
     def __setitem__(self, key: Key, value: Value) -> None:
-        if key in self:
-            del self[key]
+        self.pop(key, None)
         dict.__setitem__(self, key, value)
         if len(self) > self._size:
             del self[next(iter(self))]
@@ -37,7 +36,7 @@ class ActionHistory:
     def is_new(self, action: ActionBegan | ActionEnded, at: Seconds) -> bool:
         """True unless the report repeats an earlier one, or comes after a newer report of the same action."""
         key = (action.action, action.behavior, action.targets)
-        began, ended = self._performed.get(key, NEVER_PERFORMED)
+        began, ended = self._performed.pop(key, NEVER_PERFORMED)
         if isinstance(action, ActionBegan):
             is_new = at > began and at >= ended
             began = at if is_new else began

@@ -28,22 +28,19 @@ class KindRecognizer:
         self._config = config
         self._writer = writer
 
-    @property
-    def deadline(self) -> Seconds:
-        """Time of the next step that is due by itself; infinite: there is none."""
-        return inf
+    def outlook(self) -> tuple[Seconds, bool]:
+        """Time of the next step that is due by itself, infinite if there is none; and whether the two are in contact.
+
+        They are while the person and the robot share something. It is asked after each step that may change either.
+        """
+        return inf, False
 
     def pass_time(self, at: Seconds) -> None:
-        """Take the first step that is due at `at`, the `deadline`."""
+        """Take the first step that is due at `at`, as the `outlook` says."""
 
     @property
     def is_under_way(self) -> bool:
         """True if anything goes on that the robot's deeds may change."""
-        return False
-
-    @property
-    def is_in_contact(self) -> bool:
-        """True while the person and the robot share something, by which they are in contact."""
         return False
 
     # -- what the person and the robot do -----------------------------------------------------------------------

@@ -200,7 +200,6 @@ class EventWriter:
         self.effects.append(told)
         if event.spoken:
             self._spoken[event.id] = (event, told)
-        if self._spoken:
             self._forget_spoken(at)
         if state in ENDINGS:
             self._open.pop(event.id, None)

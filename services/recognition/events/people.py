@@ -7,15 +7,17 @@ while, in case they come back.
 from collections.abc import Callable
 from functools import partial
 from math import inf
+from typing import TypeVar
 
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import FORGOTTEN_AFTER, Deadlines
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.machine import EventWriter, Mishap, OngoingEvent, PersonForgotten
-from engage_hri.services.recognition.events.person import PersonRecognition
+from engage_hri.services.recognition.events.person import Part, PersonRecognition
 from engage_hri.services.recognition.events.scene import SessionScene, TakenUp
 
+Value = TypeVar("Value")
 Step = Callable[[PersonRecognition], object]
 
 
@@ -31,9 +33,8 @@ class People:
         self._unseen: dict[str, Seconds] = {}
         """Time of the last sign of each person who has gone or is not reported as present. The longest ago first."""
         self._met = 0
-        self._unknown: dict[str, Seconds] = {}
-        self._asked: dict[str, Seconds] = {}
-        """`scene.unknown` and `scene.asked` when the deadlines of those who were asked were last updated."""
+        self._may_go_on = False
+        """True if `scene.unknown` or `scene.asked` has changed since those were asked whether their talk goes on."""
         self._contacts: dict[str, Probability | None] = {}
         """Contact of each person with the robot."""
         self._new_contacts: dict[str, Probability | None] = {}
@@ -93,6 +94,7 @@ class People:
         self._here.pop(id, None)
         self._unseen.pop(id, None)
         self._scene.forget_person(id)
+        self._may_go_on = True
         self._contacts.pop(id, None)
         self._new_contacts.pop(id, None)
         del self.persons[id]
@@ -113,7 +115,7 @@ class People:
         is_found = before.presence.here and before.presence.reported
         self._drop(other, at, at)
         self._contacts.pop(kept, None)  # what was told of the other may be taken for it
-        gazes = [self._scene.gaze, *(person.gaze for person in self.persons.values())]
+        gazes = [self._scene.gaze, *(person.gazes.gaze for person in self.persons.values())]
         for gaze in gazes:
             gaze.targets = tuple(kept if target == other else target for target in gaze.targets)
         if is_found:
@@ -146,30 +148,29 @@ class People:
         assert at is not None
         self.apply(id, at, lambda person: person.pass_time(at))
 
-    def observe(self, id: str, at: Seconds, step: Step, *, by_look: bool = False) -> None:
-        """Apply a step that an observation of one person asks for; the person may be new. by_look: see `_update`."""
+    def observe(self, id: str, at: Seconds, step: Step, part: Part = "all") -> None:
+        """Apply a step that an observation asks for, to a person who may be new. part: what it may change."""
         person = self.person(id)
-        self._apply(person, at, step, by_look=by_look)
+        self._apply(person, at, step, part)
         self._follow(at)
         if person.presence.here or id not in self._unseen:
             self._note(person, at)
 
-    def apply(self, id: str, at: Seconds, step: Step) -> None:
-        """Apply a step to one person."""
-        self._apply(self.persons[id], at, step)
+    def apply(self, id: str, at: Seconds, step: Step, part: Part = "all") -> None:
+        """Apply a step to one person. part: what it may change."""
+        self._apply(self.persons[id], at, step, part)
         self._follow(at)
 
     def apply_to_all(
         self,
         at: Seconds,
         step: Step,
+        part: Part = "all",
         where: Callable[[PersonRecognition], object] = lambda person: True,
-        *,
-        by_look: bool = False,
     ) -> None:
-        """Apply a step to all who are here. where: tells for whom it may change something. by_look: see `_update`."""
+        """Apply a step to all who are here. part: what it may change. where: for whom it does."""
         for person in [person for person in self._here.values() if where(person)]:
-            self._apply(person, at, step, by_look=by_look)
+            self._apply(person, at, step, part)
         self._follow(at)
 
     def _follow(self, at: Seconds) -> None:
@@ -182,11 +183,11 @@ class People:
         scene = self._scene
         if scene.taken_up or self._writer.answered:
             self._tell_taken_up(at)
-        while self._unknown != scene.unknown or self._asked != scene.asked:
-            self._unknown, self._asked = {**scene.unknown}, {**scene.asked}
+        while self._may_go_on:
+            self._may_go_on, unknown = False, {**scene.unknown}
             for id in [*scene.questions]:
                 self._update(self.persons[id])
-            for id in sorted(self._unknown, key=lambda id: scene.place(id, self._unknown[id])):
+            for id in sorted(unknown, key=lambda id: scene.place(id, unknown[id])):
                 if self.persons[id].talk.may_go_on(at):
                     self._apply(self.persons[id], at, lambda person: person.talk.go_on(at))
                     self._tell_taken_up(at)
@@ -207,59 +208,42 @@ class People:
             if any(person.talk.may_answer_before(answered[first]) for person in self.persons.values()):
                 return
             told = partial(_answered_for_all, *answered.pop(first))
-            self._unknown = {}  # what has waited for it goes on
+            self._may_go_on = True  # what has waited for it
             for person in list(self.persons.values()):  # who has left meanwhile was asked, too
                 self._apply(person, at, told)
 
     def _looks_may_direct(self, at: Seconds) -> None:
         """Update the deadlines of those whose looks may direct the robot's now, for what all share has changed."""
         for person in list(self._here.values()):
-            if person.gazes.look_directs_at < inf:
-                self._apply(person, at, lambda person: None, by_look=True)
+            if person.gazes.look_directs_at() < inf:
+                self._apply(person, at, lambda person: None, "looks")
 
-    def _apply(self, person: PersonRecognition, at: Seconds, step: Step, *, by_look: bool = False) -> None:
-        """Apply a step to one person; a bug that shows in it does not affect the others. by_look: see `_update`."""
+    def _apply(self, person: PersonRecognition, at: Seconds, step: Step, part: Part = "all") -> None:
+        """Apply a step to one person; a bug that shows in it does not affect the others. part: what it may change."""
         try:
             step(person)
-            self._update(person, by_look=by_look)
+            self._update(person, part)
         except Exception as error:
             if self._strict:
                 raise
             self._writer.effects.append(Mishap(person.id, at, error))
             self.lose_track(person, at)
 
-    def _update(self, person: PersonRecognition, *, by_look: bool = False) -> None:
-        """Note when the person is due, whether it is asked, its contact with the robot, and whether it is here.
-
-        by_look: nothing but looks and presence has changed.
-        """
+    def _update(self, person: PersonRecognition, part: Part = "all") -> None:
+        """Note when the person is due, whether it is asked, its contact with the robot, and whether it is here."""
         id, scene, presence = person.id, self._scene, person.presence
-        if not by_look:
+        if part != "looks":
             asked_since = person.talk.asked_since
             if asked_since < inf or id in scene.asked:
-                self._asks(person, asked_since)
-            if (since := person.talk.undecided_since) is not None:
-                scene.unknown[id] = since
-            elif scene.unknown:
-                scene.unknown.pop(id, None)
-        due = person.note_deadlines(by_look=by_look)
-        self.agenda.set(id, None if due == inf else due)
-        if (contact := person.contact) != self._contacts.get(id):
-            self._contacts[id] = self._new_contacts[id] = contact
+                _keep(scene.questions, id, person.talk.question)
+                self._may_go_on |= _keep(scene.asked, id, asked_since if asked_since < inf else None)
+            self._may_go_on |= _keep(scene.unknown, id, person.talk.undecided_since)
+        person.settle(part)
+        self.agenda.set(id, None if person.due == inf else person.due)
+        if person.contact != self._contacts.get(id):
+            self._contacts[id] = self._new_contacts[id] = person.contact
         if presence.here is not (id in self._here) or presence.reported is not (id in scene.found):
             self._comes_or_goes(person)
-
-    def _asks(self, person: PersonRecognition, since: Seconds) -> None:
-        """Note since when the robot asks the person, and the question if it waits for the answer."""
-        id, scene, question = person.id, self._scene, person.talk.question
-        if question is not None:
-            scene.questions[id] = question
-        else:
-            scene.questions.pop(id, None)
-        if since < inf:
-            scene.asked[id] = since
-        else:
-            scene.asked.pop(id, None)
 
     def _comes_or_goes(self, person: PersonRecognition) -> None:
         """Note whether the person is here, and whether that is reported."""
@@ -277,12 +261,22 @@ class People:
             self._here = dict(sorted(self._here.items(), key=lambda one: one[1].number))
 
 
+def _keep(kept: dict[str, Value], id: str, value: Value | None) -> bool:
+    """Keep what is known of a person; None: nothing. True if that is a change."""
+    before = kept.get(id)
+    if value is not None:
+        kept[id] = value
+    elif before is not None:
+        del kept[id]
+    return value != before
+
+
 def _answered_by_other(taken_up: TakenUp, asked: PersonRecognition) -> None:
     """Tell the person who was asked that somebody else has answered."""
     _, by, action, at = taken_up
-    asked.talk.take_early(at, lambda talk: talk.pair.other_answers(by, action, at))
+    asked.talk.take_early(at, lambda talk: talk.exchange.pair.other_answers(by, action, at))
 
 
 def _answered_for_all(answered: OngoingEvent, at: Seconds, asked: PersonRecognition) -> None:
     """Tell a person that the robot's question to several people, maybe to this one, has been answered."""
-    asked.talk.take_early(at, lambda talk: talk.pair.answered_for_all(answered, at))
+    asked.talk.take_early(at, lambda talk: talk.exchange.pair.answered_for_all(answered, at))

@@ -1,8 +1,9 @@
 """One person and the robot: what each does becomes input of the recognizers of all kinds of events between them."""
 
+from collections.abc import Callable
 from math import inf
 from operator import attrgetter
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from engage_hri.schemas.behaviors import EVENT_KINDS, Action, EventKind
 from engage_hri.schemas.perception import ActionBegan, ActionEnded
@@ -13,20 +14,21 @@ from engage_hri.services.recognition.events.history import ActionHistory
 from engage_hri.services.recognition.events.kinds import KindRecognizer, own_recognizer
 from engage_hri.services.recognition.events.machine import EventWriter
 from engage_hri.services.recognition.events.presence import FacePresence
-from engage_hri.services.recognition.events.scene import GazeState, SessionScene
+from engage_hri.services.recognition.events.scene import SessionScene
 from engage_hri.services.recognition.events.talk import Talk
 
-LONGEST_SPEECH: Seconds = 60.0
-"""Time after which speech is over if no report of its end has come. The next beginning ends it, too. Ours."""
+LONGEST: dict[Action, Seconds] = {"speak": 60.0, "act": 120.0}
+"""Time after which speech or a manipulation is over if no report of its end has come; the next ends it, too. Ours."""
 LONGEST_GESTURE: Seconds = 10.0
 """The same for a nod, a shake, a point, and any other action. Ours."""
-LONGEST_MANIPULATION: Seconds = 120.0
-"""The same for a manipulation. Ours."""
 ACTIONS_KEPT = 64
 """Number of actions of each person for which it is remembered when they last began and ended."""
 
 
-_is_under_way = attrgetter("is_under_way")
+Part = Literal["all", "looks", "rest"]
+"""What of a person a step may change: all, the look and the gaze events, or the rest; presence with any of these.
+Most of what people do is looking about, and concerns nothing else."""
+_is_under_way, _until = attrgetter("is_under_way"), attrgetter("until")
 
 
 class _Doing(NamedTuple):
@@ -56,71 +58,55 @@ class PersonRecognition:
             kind: shared.get(kind) or own_recognizer(kind)(id, scene, config, writer) for kind in EVENT_KINDS
         }
         self._recognizers = tuple(dict.fromkeys(self._by_kind.values()))
-        self._others = tuple(each for each in self._recognizers if each is not self.gazes)
+        self._rest = tuple(each for each in self._recognizers if each is not self.gazes)
         """Recognizers of which looks are no part."""
         self.history = ActionHistory(ACTIONS_KEPT)
         self._doing: dict[Action, _Doing] = {}
         """Present actions other than looking."""
-        self._looks_due = self._others_due = inf
-        """Times of the next steps due by themselves: of presence and looks, and of all the rest."""
+        self.due: Seconds = inf
+        """Time of the next step that is due by itself, unless an input comes before; then call `pass_time`."""
+        self.contact: Probability | None = None
+        """Contact with the robot now, from 0 to 1; None: nobody has told where the person looks."""
+        self._looks_due = self._rest_due = inf
+        self._looks_touch = self._rest_touches = False
+        """True if the person is in contact with the robot by looks, or by all the rest."""
         self._scene = scene
-
-    @property
-    def gaze(self) -> GazeState:
-        """Look of the person."""
-        return self.gazes.gaze
 
     # -- time ---------------------------------------------------------------------------------------------------
 
-    @property
-    def deadline(self) -> Seconds:
-        """Time of the next step that is due by itself, unless an input comes before; then call `pass_time`."""
-        looks, others = self._looks_due, self._others_due
-        return looks if looks < others else others
-
-    def note_deadlines(self, *, by_look: bool) -> Seconds:
-        """Note when steps are due, after an input; return the `deadline`. by_look: only looks and presence changed.
-
-        Most of what people do is looking about, and asks for nothing else.
-        """
-        due, gaze = self.presence.deadline, self.gazes.gaze
-        if gaze.targets:
-            due = min(due, self.gazes.look_directs_at if gaze.ended == inf else gaze.deadline)
-        self._looks_due = min(due, self.gazes.deadline)
-        if not by_look:
-            due = inf
-            for each in self._others:
-                if (at := each.deadline) < due:
-                    due = at
-            for doing in self._doing.values():
-                if doing.until < due:
-                    due = doing.until
-            self._others_due = due
-        return self.deadline
+    def settle(self, part: Part) -> None:
+        """Bring `due` and `contact` up to date after a step that may have changed this part of the person."""
+        gaze = self.gazes.gaze
+        if part != "rest":
+            due, self._looks_touch = self.gazes.outlook()
+            if gaze.targets:
+                due = min(due, self.gazes.look_directs_at() if gaze.ended == inf else gaze.deadline)
+            self._looks_due = due
+        if part != "looks":
+            self._rest_due, self._rest_touches = min(map(_until, self._doing.values()), default=inf), False
+            for each in self._rest:
+                due, touches = each.outlook()
+                self._rest_due, self._rest_touches = min(due, self._rest_due), touches or self._rest_touches
+        self.due = min(self.presence.deadline, self._looks_due, self._rest_due)
+        if self.presence.here and (self._looks_touch or self._rest_touches):
+            self.contact = 1.0
+        else:
+            self.contact = None if gaze.since == 0.0 and not gaze.targets else 0.0
 
     @property
     def is_involved(self) -> bool:
         """True if anything goes on between the person and the robot that the robot's deeds may change."""
         return any(map(_is_under_way, self._recognizers))
 
-    @property
-    def contact(self) -> Probability | None:
-        """Contact with the robot now, from 0 to 1; None: nobody has told where the person looks."""
-        if self.presence.here:
-            for each in self._recognizers:
-                if each.is_in_contact:
-                    return 1.0
-        return None if self.gaze.since == 0.0 and not self.gaze.targets else 0.0
-
     def pass_time(self, at: Seconds) -> None:
         """Take the first step that is due at `at`. There is none if something that all share has put it off."""
-        if self.gaze.deadline == at:
-            self.gaze_changed(self.gaze.expire())
+        if self.gazes.gaze.deadline == at:
+            self.gaze_changed(self.gazes.gaze.expire())
         elif self.presence.deadline == at:
             self.leave(at)
-        elif (due := next((each for each in self._recognizers if each.deadline == at), None)) is not None:
+        elif (due := next((each for each in self._recognizers if each.outlook()[0] == at), None)) is not None:
             due.pass_time(at)
-        elif self.gazes.look_directs_at == at:
+        elif self.gazes.look_directs_at() == at:
             self.gazes.look_directs(at)
         else:
             self._end_overlong(at)
@@ -141,7 +127,7 @@ class PersonRecognition:
         action = began.action
         if action == "look":
             was_on_face = self.gazes.on_robots_face
-            if self.gaze.begin(began.targets, at, began.confidence, one_of=began.one_of):
+            if self.gazes.gaze.begin(began.targets, at, began.confidence, one_of=began.one_of):
                 self.gaze_changed(at)
                 if not was_on_face:
                     self.gazes.seeks_face(at)
@@ -157,7 +143,7 @@ class PersonRecognition:
     def _note(self, began: ActionBegan, since: Seconds, at: Seconds) -> None:
         """Note an action of the person that goes on. at: time from which on its end is waited for."""
         action = began.action
-        self._doing[action] = _Doing(began.targets, since, at + self._longest(action))
+        self._doing[action] = _Doing(began.targets, since, at + LONGEST.get(action, LONGEST_GESTURE))
         if action == "speak":
             self._scene.speaks(self.id)
         elif action == "act":
@@ -170,11 +156,11 @@ class PersonRecognition:
         self.history.is_new(began, since)  # its beginning is no news any more
         action, targets = began.action, began.targets
         if action == "look":
-            if self.gaze.targets and since < self.gaze.since:
+            if self.gazes.gaze.targets and since < self.gazes.gaze.since:
                 return  # there is a newer one
-            since = max(since, self.gaze.since)
-            if self.gaze.begin(targets, since, began.confidence, one_of=began.one_of):
-                self.gaze.spent = True
+            since = max(since, self.gazes.gaze.since)
+            if self.gazes.gaze.begin(targets, since, began.confidence, one_of=began.one_of):
+                self.gazes.gaze.spent = True
                 self.gaze_changed(since)
         elif action not in self._doing:
             self._note(began, since, at)
@@ -184,7 +170,7 @@ class PersonRecognition:
         if not self.history.is_new(ended, at):
             return
         if ended.action == "look":
-            self.gaze.end(ended.targets, at)
+            self.gazes.gaze.end(ended.targets, at)
             return
         doing = self._doing.get(ended.action)
         if doing is not None and at >= doing.since and (not ended.targets or ended.targets == doing.targets):
@@ -199,11 +185,6 @@ class PersonRecognition:
         for each in self._recognizers:
             each.stops(action, at)
 
-    def _longest(self, action: Action) -> Seconds:
-        if action == "speak":
-            return LONGEST_SPEECH
-        return LONGEST_MANIPULATION if action == "act" else LONGEST_GESTURE
-
     def _end_overlong(self, at: Seconds) -> None:
         """End actions with a lost end and no later beginning."""
         for action in [action for action, one in self._doing.items() if one.until <= at]:
@@ -211,34 +192,22 @@ class PersonRecognition:
 
     def gaze_changed(self, at: Seconds) -> None:
         """Take a change of the person's gaze."""
-        self.talk.looks_at(self.gazes.face, at)
+        if self.talk.is_in_line:
+            self.talk.looks_at(self.gazes.face, at)
         self.gazes.gaze_changed(at)
 
     # -- the robot ----------------------------------------------------------------------------------------------
 
-    def robot_begins(self, began: ActionBegan, at: Seconds) -> None:
+    def tell(self, step: Callable[[KindRecognizer], None]) -> None:
+        """Tell all recognizers what the robot does."""
         for each in self._recognizers:
-            each.robot_begins(began, at)
-
-    def robot_stops(self, action: Action, at: Seconds) -> None:
-        for each in self._recognizers:
-            each.robot_stops(action, at)
+            step(each)
 
     def recognizer(self, kind: EventKind) -> KindRecognizer:
         """Recognizer of the events of this kind."""
         return self._by_kind[kind]
 
-    def point_realised(self, block: str, name: str, at: Seconds) -> None:
-        """Take a realised sync point of a block of the robot: time limits may run from there."""
-        for each in self._recognizers:
-            each.point_realised(block, name, at)
-
     def abort(self, at: Seconds, *, turn: str) -> None:
         """End the events that the robot began in a turn that was cut off: what was said, then what was shown."""
         for each in reversed(self._recognizers):
             each.abort(at, turn=turn)
-
-    def block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
-        """Take the end of a block of the robot."""
-        for each in self._recognizers:
-            each.block_ended(block, at, aborted=aborted)

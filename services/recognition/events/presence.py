@@ -22,12 +22,9 @@ class FacePresence:
         self.reported = False
         """True if perception has reported that the person is there, and so will report when that is over."""
         self._lost_at: Seconds | None = None
-        self._found_last = self._seen_last = self._lost_last = self.left_at = NEVER
-
-    @property
-    def deadline(self) -> Seconds:
+        self.deadline: Seconds = inf
         """Time at which the person has gone, unless it is seen again before; then call `leave`. Infinite: never."""
-        return inf if self._lost_at is None else self._lost_at + FACE_GRACE
+        self._found_last = self._seen_last = self._lost_last = self.left_at = NEVER
 
     def seen(self, at: Seconds) -> bool:
         """Take an observation at `at` that shows the person is there. False if it is from before the person left."""
@@ -35,7 +32,8 @@ class FacePresence:
             return False
         self._seen_last = max(self._seen_last, at)
         if self._lost_at is None or at >= self._lost_at:
-            self.here, self._lost_at = True, self._lost_last if at < self._lost_last else None
+            self.here = True
+            self._is_lost_since(self._lost_last if at < self._lost_last else None)
         return True
 
     def found(self, at: Seconds) -> None:
@@ -49,14 +47,18 @@ class FacePresence:
             return
         self._lost_last = at
         if self.here and self._lost_at is None:
-            self._lost_at = at
+            self._is_lost_since(at)
 
     def leave(self) -> Seconds:
         """Count the person as gone. Returns the time at which it was last there."""
         assert self._lost_at is not None
-        self.here, self.reported, self.left_at, self._lost_at = False, False, self._lost_at, None
+        self.here, self.reported, self.left_at = False, False, self._lost_at
+        self._is_lost_since(None)
         return self.left_at
 
     def vanish(self, at: Seconds) -> None:
         """Count the person as lost since `at`, the last report of it; call `leave` next."""
-        self._lost_at = at
+        self._is_lost_since(at)
+
+    def _is_lost_since(self, at: Seconds | None) -> None:
+        self._lost_at, self.deadline = at, inf if at is None else at + FACE_GRACE

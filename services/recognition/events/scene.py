@@ -336,8 +336,7 @@ class SessionScene:
         if not self.asked or not self.unknown:
             return False
         place = self.place(person, at)
-        before = [who for who, since in self.unknown.items() if since <= at and who != person]
-        return any(self.place(who, self.unknown[who]) < place for who in before)
+        return any(who != person and self.place(who, since) < place for who, since in self.unknown.items())
 
     def place(self, person: str, at: Seconds) -> tuple[Seconds, bool, str]:
         """Place of what a person begins to say in the order in which people are heard: who is asked comes first."""

@@ -20,7 +20,7 @@ from engage_hri.schemas.fragments import HeadOwner
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, TurnOutcome
 from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused
-from engage_hri.schemas.units import Probability, Seconds
+from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.addressing import WHOEVER, WORDS_AFTER, Addressees, Spoken, renamed_in
@@ -29,7 +29,7 @@ from engage_hri.services.recognition.events.history import ActionHistory, Latest
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock, anchor
 from engage_hri.services.recognition.events.machine import Effect, EventWriter, Mishap, OngoingEvent
 from engage_hri.services.recognition.events.people import People
-from engage_hri.services.recognition.events.person import PersonRecognition
+from engage_hri.services.recognition.events.person import Part, PersonRecognition
 from engage_hri.services.recognition.events.scene import Covered, SessionScene, Worded
 from engage_hri.services.recognition.events.talk import Step
 from engage_hri.services.reports.ongoing_actions import GoesOn
@@ -39,6 +39,9 @@ WORDS_PATIENCE: Seconds = 10.0
 0065."""
 ACCEPT: tuple[Action, ...] = ("speak", "nod", "shake", "point")
 """Actions that answer an adjacency pair of the robot, unless its request names others. Thesis 2.2.3."""
+PARTS: dict[Action, Part] = {"look": "looks", "point": "all", "act": "all"}
+"""What of a person an action may change, of theirs or of the robot; any other only "rest". Hands go with looks: a
+point directs the other's, and who moves a thing looks at it."""
 SETTLING: Seconds = 0.35
 """Longest time for which events wait for raw perception that is undecided.
 Decision 0009."""
@@ -71,6 +74,12 @@ class Session:
         self._writer = EventWriter(clock, name, words_patience=WORDS_PATIENCE)
         self._people = People(self.scene, config, self._writer, strict=strict)
         self._agenda = self._people.agenda
+        self.persons = self._people.persons
+        """Persons who are here, or have not been gone for long."""
+        self.busy: Set[str] = self.scene.acting
+        """Persons with a task in hand."""
+        self.contacts = self._people.contacts
+        """Tells contact with each person for whom it has changed since the last call."""
         self._ended_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
         self._aborted_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
         self._robot_actions: dict[tuple[str, Action], ActionBegan] = {}
@@ -95,11 +104,6 @@ class Session:
         """What each kind of observation changes."""
 
     @property
-    def persons(self) -> dict[str, PersonRecognition]:
-        """Persons who are here, or have not been gone for long."""
-        return self._people.persons
-
-    @property
     def in_company(self) -> bool:
         """True if more than one person is here."""
         return len(self.scene.company("")) > 1
@@ -109,18 +113,9 @@ class Session:
         said = self.scene.robot_spoken
         speeches: list[Spoken] = [] if said is None else [said]
         for person in self.persons.values():
-            if person.presence.here and (speech := person.talk.speech) is not None:
+            if person.presence.here and (speech := person.talk.speeches.going_on) is not None:
                 speeches.append(speech)
         return sorted(speeches, key=lambda each: (each.since, each.actor))
-
-    def contacts(self) -> dict[str, Probability | None]:
-        """Contact with each person for whom it has changed since the last call."""
-        return self._people.contacts()
-
-    @property
-    def busy(self) -> Set[str]:
-        """Persons with a task in hand."""
-        return self.scene.acting
 
     # -- time ---------------------------------------------------------------------------------------------------
 
@@ -161,15 +156,17 @@ class Session:
         if began.actor == self.robot:
             self._robot_begins(began, at)
         else:
-            by_look = began.action == "look" and began.actor not in self.scene.unknown
-            self._people.observe(began.actor, at, lambda person: person.begins(began, at), by_look=by_look)
+            may_be_known = began.action == "look" and began.actor in self.scene.unknown  # to whom the person speaks
+            part = "all" if may_be_known else PARTS.get(began.action, "rest")
+            self._people.observe(began.actor, at, lambda person: person.begins(began, at), part)
 
     def _ends(self, ended: ActionEnded, at: Seconds) -> None:
         if ended.actor == self.robot:
             self._robot_ends(ended, at)
         elif ended.actor in self.persons:
-            by_look = ended.action == "look"
-            self._people.observe(ended.actor, at, lambda person: person.ends(ended, at), by_look=by_look)
+            self._people.observe(
+                ended.actor, at, lambda person: person.ends(ended, at), PARTS.get(ended.action, "rest")
+            )
 
     def _goes_on(self, observation: GoesOn, at: Seconds) -> None:
         began, since = observation.began, observation.since
@@ -188,12 +185,12 @@ class Session:
 
     def _hands_changed(self, covered: Covered, at: Seconds) -> None:
         self.scene.covered = covered
-        self._people.apply_to_all(at, lambda person: person.gazes.hands_changed(), by_look=True)
+        self._people.apply_to_all(at, lambda person: person.gazes.hands_changed(), "looks")
 
     def _head_owner_changed(self, head: HeadOwner, at: Seconds) -> None:
         self.scene.head_owner = head.owner
         self._people.apply_to_all(
-            at, lambda person: person.gazes.head_owner_changed(at), _has_gaze_under_way, by_look=True
+            at, lambda person: person.gazes.head_owner_changed(at), "looks", _has_gaze_under_way
         )
 
     def resume(self, former: ConnectionEvent, at: Seconds) -> list[Effect]:
@@ -212,7 +209,7 @@ class Session:
         self._people.observe(
             person,
             at,
-            lambda person: person.talk.take(at, lambda talk: talk.pair.resume(event, at, by_robot=by_robot)),
+            lambda person: person.talk.take(at, lambda talk: talk.exchange.pair.resume(event, at, by_robot=by_robot)),
         )
         return self._take()
 
@@ -266,17 +263,17 @@ class Session:
             self._robot_looks(began.targets, at)
             return
         self._robot_actions[began.behavior, began.action] = began
+        listens = self.scene.is_listening(began.behavior)
         match began.action:
             case "speak":
                 self._heard_at = None
                 if self.scene.robot_speaks_since is None:
                     self._robot_speaks(began, at)
-                    listens = self.scene.is_listening(began.behavior)
                     self._say(began, at, lambda talk: talk.robot_speaks(at, listens=listens))
             case "nod" | "shake" | "point":
-                listens = self.scene.is_listening(began.behavior)
                 self._say(began, at, lambda talk: talk.robot_gestures(began.action, at, listens=listens))
-        self._people.apply_to_all(at, lambda person: person.robot_begins(began, at))
+        part = PARTS.get(began.action, "rest")
+        self._people.apply_to_all(at, lambda person: person.tell(lambda kind: kind.robot_begins(began, at)), part)
 
     def _robot_speaks(self, began: ActionBegan, at: Seconds) -> None:
         self.scene.speaks(self.robot)
@@ -339,7 +336,10 @@ class Session:
                 return
             self.scene.robot_falls_silent(at)
         self._people.apply_to_all(
-            at, lambda person: person.robot_stops(action, at), lambda person: person.is_involved
+            at,
+            lambda person: person.tell(lambda kind: kind.robot_stops(action, at)),
+            "rest",
+            lambda person: person.is_involved,
         )
 
     def _understand(self, words: Worded, at: Seconds) -> None:
@@ -393,7 +393,7 @@ class Session:
         self._agenda.set(self.robot, None if due == inf else due)
 
     def _robot_gaze_changed(self, at: Seconds) -> None:
-        self._people.apply_to_all(at, lambda person: person.gazes.gaze_changed(at), _has_gaze_under_way, by_look=True)
+        self._people.apply_to_all(at, lambda person: person.gazes.gaze_changed(at), "looks", _has_gaze_under_way)
 
     # -- requests -----------------------------------------------------------------------------------------------
 
@@ -547,22 +547,24 @@ class Session:
         self._tell(actor, at, lambda talk: talk.cut_off(at, turn=turn))
         self._apply_to_addressees(actor, at, lambda person: person.abort(at, turn=turn))
 
-    def _apply_to_addressees(self, actor: str, at: Seconds, step: Callable[[PersonRecognition], object]) -> None:
-        """Apply a step to a known person, or to all (actor: empty)."""
+    def _apply_to_addressees(
+        self, actor: str, at: Seconds, step: Callable[[PersonRecognition], object], part: Part = "all"
+    ) -> None:
+        """Apply a step to a known person, or to all (actor: empty). part: what it may change."""
         if not actor:
-            self._people.apply_to_all(at, step)
+            self._people.apply_to_all(at, step, part)
         elif actor in self.persons:
-            self._people.apply(actor, at, step)
+            self._people.apply(actor, at, step, part)
 
     def _tell(self, actor: str, at: Seconds, step: Step) -> None:
         """Tell what happens to the conversation with a known person, or with all (actor: empty)."""
-        self._apply_to_addressees(actor, at, lambda person: person.talk.take(at, step))
+        self._apply_to_addressees(actor, at, lambda person: person.talk.take(at, step), "rest")
 
     def _point_realised(self, point: SyncPointProgress, at: Seconds) -> None:
         block = point.block
         name = self.blocks.realised(block, point.behavior, point.sync, at)
         for id in self._waiting_for(block, name):
-            self._people.apply(id, at, lambda person: person.point_realised(block, name, at))
+            self._people.apply(id, at, lambda person: person.tell(lambda kind: kind.point_realised(block, name, at)))
 
     def _block_progresses(self, told: BlockProgress, at: Seconds) -> None:
         if told.block is not None and told.progress == "start":
@@ -583,12 +585,12 @@ class Session:
         self._robot_stops(at, f"{block}:")
         self._people.apply_to_all(
             at,
-            lambda person: person.block_ended(block, at, aborted=aborted),
-            lambda person: person.is_involved,
+            lambda person: person.tell(lambda kind: kind.block_ended(block, at, aborted=aborted)),
+            where=lambda person: person.is_involved,
         )
         answered = self._answering_blocks.pop(block, None)
         if answered is not None:
-            self._tell(answered, at, lambda talk: talk.pair.answered_block_ended(at))
+            self._tell(answered, at, lambda talk: talk.exchange.pair.answered_block_ended(at))
 
 
 def _has_gaze_under_way(person: PersonRecognition) -> bool:

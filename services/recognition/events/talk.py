@@ -1,4 +1,4 @@
-"""Talk of one person and the robot, told to their `Conversation` once it is known to whom each speech is.
+"""Talk of one person and the robot, told to their `Dialogue` once it is known to whom each speech is.
 
 In company it is known only at the end of a speech, or with its words, whether it is for the robot (`addressing`). And
 where recognizers tell words, these tell whether a sound is speech at all: a cough after a question is no answer. What
@@ -9,8 +9,9 @@ Into the robot's words it is no other, only that the robot waits: it falls silen
 that nothing is waited for longer than it has to be. To whom a sign of a listener is, and its words, are known here;
 what it is says the conversation, which knows what else it may be (`listener_sign`).
 
-The person's latest speeches are remembered. Of what nothing has been told, words that come late may say anything: to
-whom it was, and that it was no noise. Of the rest they correct what the conversation has taken it for (`listener`).
+The person's latest speeches are remembered (`own_speeches`). Of what nothing has been told, words that come late may
+say anything: to whom it was, and that it was no noise. Of the rest they correct what the conversation has taken it
+for (`listener`).
 """
 
 from collections import deque
@@ -23,27 +24,16 @@ from engage_hri.schemas.behaviors import EVENT_KINDS, Action, Event
 from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.addressing import (
-    NOBODY,
-    WORDS_AFTER,
-    Addressees,
-    FaceTimes,
-    OwnSpeech,
-    Spoken,
-    certain,
-    likely,
-)
+from engage_hri.services.recognition.events.addressing import NOBODY, WORDS_AFTER, Addressees, OwnSpeech
 from engage_hri.services.recognition.events.conversation import Dialogue
-from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.kinds import KindRecognizer
 from engage_hri.services.recognition.events.limits import ROUNDING, LimitClock, in_time
 from engage_hri.services.recognition.events.listener_sign import WORDS_WAIT, SignPart
 from engage_hri.services.recognition.events.machine import Answered, EventWriter, OngoingEvent
+from engage_hri.services.recognition.events.own_speeches import OwnSpeeches
 from engage_hri.services.recognition.events.scene import Question, SessionScene
 from engage_hri.services.text.listening import is_listening, says_words
 
-SPEECHES_KEPT = 8
-"""Number of speeches of each person of which words may still tell what they were, and for whom."""
 Step = Callable[[Dialogue], object]
 
 
@@ -63,15 +53,12 @@ class Talk(KindRecognizer):
         """What is not told yet, with its times. The first is a speech of which it is not known to whom it is."""
         self._asked_in_line: Seconds = inf
         """Start of the first turn of the robot that is in line; infinite: none is."""
-        self.speech: OwnSpeech | None = None
-        """The speech of the person that goes on."""
-        self._speeches: Latest[Seconds, OwnSpeech] = Latest(SPEECHES_KEPT)
-        """The person's latest speeches, by their starts."""
+        self.speeches = OwnSpeeches(id, scene, config, writer)
 
     @property
-    def is_in_contact(self) -> bool:
-        """True while the person says something that is known to be for the robot."""
-        return self.speech is not None and self.speech.is_to(self._scene.robot)
+    def is_in_line(self) -> bool:
+        """True if something of the talk is not told yet."""
+        return bool(self._line)
 
     @property
     def question(self) -> Question | None:
@@ -82,8 +69,9 @@ class Talk(KindRecognizer):
     @property
     def undecided_since(self) -> Seconds | None:
         """Start of the first of what the person says of which it is not known whether it is for the robot."""
-        beside = self._conversation.listener.beside_since
-        return beside if beside is not None or not self._line else self._line[0][0]
+        listener = self._conversation.listener
+        beside = None if listener.sign is None else listener.beside_since
+        return self._line[0][0] if beside is None and self._line else beside
 
     @property
     def asked_since(self) -> Seconds:
@@ -93,7 +81,7 @@ class Talk(KindRecognizer):
 
     def may_answer_before(self, answered: Answered) -> bool:
         """True if the person has answered the same turn of the robot, too, or may have, and has begun before."""
-        pair, sign = self._conversation.pair, self._conversation.listener.sign
+        pair, sign = self._conversation.exchange.pair, self._conversation.listener.sign
         is_asked = pair.is_turn(answered.event.turn)
         since = [at for at, _ in islice(self._line, 1)]
         if is_asked:
@@ -109,12 +97,13 @@ class Talk(KindRecognizer):
 
     # -- time ---------------------------------------------------------------------------------------------------
 
-    @property
-    def deadline(self) -> Seconds:
+    def outlook(self) -> tuple[Seconds, bool]:
+        """See `KindRecognizer`. Contact is what the person says that is known to be for the robot."""
+        in_contact = self.speeches.going_on is not None and self.speeches.going_on.is_to(self._scene.robot)
         if not self._line:
-            return self._conversation.deadline
-        speech = self._undecided_first
-        return inf if speech is None else self._decided_at(speech)
+            return self._conversation.deadline, in_contact
+        first = self._undecided_first()
+        return inf if first is None else self._decided_at(first), in_contact
 
     def pass_time(self, at: Seconds) -> None:
         if self._line:
@@ -145,10 +134,10 @@ class Talk(KindRecognizer):
 
     def looks_at(self, face: str, at: Seconds) -> None:
         """Take a look at a face, or away from all ("")."""
-        for speech in self._undecided if self._line else ():
+        for speech in self._undecided:
             if speech.until is None:
                 speech.faces.turns(face, at)
-                self._may_interrupt(speech, face, at)
+                self.speeches.may_interrupt(speech, face, at)
         self.go_on(at)
 
     def begins(self, began: ActionBegan, at: Seconds, face: str) -> None:
@@ -169,9 +158,9 @@ class Talk(KindRecognizer):
 
     def _speaks(self, at: Seconds, confidence: Probability, face: str) -> None:
         """Take the beginning of a speech. face: whose face the person looks at."""
-        if self.speech is not None:
+        if self.speeches.going_on is not None:
             self._falls_silent(at)  # it was begun by another id, of which no end has come
-        speech = self._own_speech(at, confidence, face)
+        speech = self.speeches.begin(at, confidence, face)
         speech.told, speech.words = self._scene.told_to(self.id, at), self._writer.text_of(self.id, at)
         # What waits in line may be the robot's own turn, so that only the scene knows that it has begun.
         said = self._scene.robot_spoken
@@ -185,31 +174,25 @@ class Talk(KindRecognizer):
         speech.may_be_noise = self._scene.is_worded and not (is_line or says_words(speech.words))
         speech.is_into_turn = is_into_turn
         speech.is_open = is_into_turn or speech.is_beside
-        self._find(speech, at)
-        self._may_interrupt(speech, face, at)
+        self.speeches.is_certain(speech, at)
+        self.speeches.may_interrupt(speech, face, at)
         if not self._line:
             self._conversation.listener.next_begins()
         self._queue(at, speech)
 
-    def _may_interrupt(self, speech: OwnSpeech, face: str, at: Seconds) -> None:
-        """Tell of a speech into the robot's turn, unless it is for somebody else, or looks like that.
-
-        Of one into its words to others that is told when it is known to be for the robot.
-        """
-        is_aside = face not in ("", self._scene.robot) if speech.to is None else not speech.is_to(self._scene.robot)
-        is_for_robot = speech.is_beside and speech.is_to(self._scene.robot)
-        if (speech.is_into_turn or is_for_robot) and not is_aside:
-            self._writer.interject(self.id, speech.since, "open", at)
-
     def _falls_silent(self, at: Seconds) -> None:
         """Take the end of the speech that goes on."""
-        speech, self.speech = self.speech, None
+        speech, self.speeches.going_on = self.speeches.going_on, None
         if speech is None:
             return
         speech.until = at
         speech.faces.turns("", at)
-        self.take(at, lambda talk: talk.falls_silent(at) if speech.is_to(self._scene.robot) else None)
+        self.take(at, self._end_of(speech, at))
         self.go_on(at)
+
+    def _end_of(self, speech: OwnSpeech, at: Seconds) -> Step:
+        """Step that tells the end of a speech, if that is for the robot."""
+        return lambda talk: talk.falls_silent(at) if speech.is_to(self._scene.robot) else None
 
     def _shows(self, at: Seconds, face: str, step: Step) -> None:
         """Take a sign without words, which is to the robot unless the person looks at somebody else's face.
@@ -224,15 +207,15 @@ class Talk(KindRecognizer):
     def goes_on(self, action: Action, since: Seconds, at: Seconds, confidence: Probability, face: str) -> None:
         """Take an action that goes on, known only now, at `at`. It has been decided by the looks of now to whom."""
         part = SignPart(action, since, confidence)
-        if action == "speak" and self._has_said(since):
-            known = self.speech  # it has been told by another id of the person
+        if action == "speak" and self.speeches.has_said(since):
+            known = self.speeches.going_on  # it has been told by another id of the person
             if known is None or not known.is_heard:
                 return
             part = known.part
         elif action == "speak":
-            speech = self._own_speech(since, confidence, face)
-            if not self._find(speech, at):
-                self._address(speech, self._likely(speech, at), at)
+            speech = self.speeches.begin(since, confidence, face)
+            if not self.speeches.is_certain(speech, at):
+                self.speeches.address(speech, self._likely(speech, at), at)
             if not speech.is_to(self._scene.robot):
                 return
             speech.is_heard, part = True, speech.part
@@ -240,12 +223,11 @@ class Talk(KindRecognizer):
 
     def understand(self, since: Seconds, words: str, told: Addressees | None, at: Seconds) -> None:
         """Take the words of a speech. told: addressees, if perception knows them."""
-        speech = self._speeches.get(since)
+        speech = self.speeches.find(since)
         if speech is None:
             self._writer.interject_again(self.id, since, at)
             return
-        speech.words, speech.told = words or speech.words, told or speech.told
-        self._is_known_speech(speech, is_known=says_words(speech.words))
+        self.speeches.hear(speech, words, told)
         if not speech.is_heard or speech.is_noise:
             self._has_news(speech, at)
         self.take(at, lambda talk: self._judge(talk, speech, at))
@@ -256,19 +238,13 @@ class Talk(KindRecognizer):
         talk.understand(speech.part, at)
         self._writer.interject_again(self.id, speech.since, at)
 
-    def _is_known_speech(self, speech: OwnSpeech, *, is_known: bool = True) -> None:
-        """Note that a sound is no noise, or that nothing else may be known of it."""
-        if is_known and speech.may_be_noise:
-            speech.may_be_noise = False
-            self._scene.floor_changes += 1
-
     def _has_news(self, speech: OwnSpeech, at: Seconds) -> None:
         """Take news of a speech of which nothing is told yet: it may be for others than it seemed, and no noise."""
         is_noise, robot = speech.is_noise, self._scene.robot
         if is_noise and not says_words(speech.words):
             return
-        if not self._find(speech, at) and is_noise and not speech.is_heard:
-            self._address(speech, self._likely(speech, at), at)
+        if not self.speeches.is_certain(speech, at) and is_noise and not speech.is_heard:
+            self.speeches.address(speech, self._likely(speech, at), at)
         if not speech.is_to(robot):
             speech.is_noise = speech.is_heard = False  # more of the words may still call it
             speech.part.taken_for = ""
@@ -284,9 +260,9 @@ class Talk(KindRecognizer):
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         """Take the person's leaving: nothing waits any longer."""
-        if self.speech is not None and self.speech.until is None:
-            self.speech.until = until
-        self.speech = None
+        if self.speeches.going_on is not None and self.speeches.going_on.until is None:
+            self.speeches.going_on.until = until
+        self.speeches.going_on = None
         for speech in self._undecided:
             self._decide(speech, at)
         self.go_on(at)
@@ -294,7 +270,7 @@ class Talk(KindRecognizer):
 
     def _is_gone(self, talk: Dialogue, at: Seconds, until: Seconds) -> None:
         talk.person_gone(at, until)
-        self._speeches.clear()
+        self.speeches.forget()
 
     def take_over(self, other: "Talk", at: Seconds, *, goes_on: bool) -> None:
         """Take what the person has said by another id; what is not decided of it is decided here.
@@ -302,26 +278,20 @@ class Talk(KindRecognizer):
         goes_on: what they say by that id goes on. What both ids have said at one time, two reporters have told.
         """
         self.person_back()
-        for speech in sorted(other._speeches.values(), key=lambda each: each.since):
+        for speech in other.speeches.in_order():
             is_open = other._is_open(speech)
             speech.actor = self.id
             if speech.until is None and not goes_on:
                 speech.until = at
-            if self._has_said(speech.since, speech.until, speech):
+            if self.speeches.has_said(speech.since, speech.until, speech):
                 self._scene.forget_spoken(speech)
-                if is_open and speech.since not in self._speeches:
+                if is_open and self.speeches.find(speech.since) is None:
                     self._writer.decide_interjection(self.id, speech.since, "noise", at)
                 continue
-            self._speeches[speech.since] = speech
-            self.speech = speech if speech.until is None else self.speech
+            self.speeches.remember(speech)
             if is_open:
                 self._begin_again(speech)
         self.go_on(at)
-
-    def _has_said(self, since: Seconds, until: Seconds | None = None, but: Spoken | None = None) -> bool:
-        """True if the person has said anything else at this time, as far as it is remembered."""
-        said = [each for each in (*self._scene.spoken, *self._speeches.values()) if each.actor == self.id]
-        return any(each is not but and each.overlaps(since, until) for each in said)
 
     def _is_open(self, speech: OwnSpeech) -> bool:
         """True if a speech is not decided."""
@@ -334,19 +304,11 @@ class Talk(KindRecognizer):
         speech.part = SignPart("speak", since, speech.part.confidence)
         self._line.insert(self._place(since), (since, speech))
         if until is not None:
-            step = lambda talk: talk.falls_silent(until) if speech.is_to(self._scene.robot) else None  # noqa: E731
-            self._line.insert(self._place(until), (until, step))
+            self._line.insert(self._place(until), (until, self._end_of(speech, until)))
 
     def person_back(self) -> None:
         """Take the person's return: the robot may be speaking, or may have fallen silent meanwhile."""
         self._conversation.robot_speaks_since = self._scene.robot_speaks_to(self.id)
-
-    def _own_speech(self, since: Seconds, confidence: Probability, face: str) -> OwnSpeech:
-        """Begin to remember a speech."""
-        part = SignPart("speak", since, confidence)
-        speech = OwnSpeech(actor=self.id, since=since, part=part, faces=FaceTimes(since, face))
-        self.speech = self._speeches[since] = speech
-        return speech
 
     # -- the line -----------------------------------------------------------------------------------------------
 
@@ -391,7 +353,7 @@ class Talk(KindRecognizer):
 
     def robot_begins(self, began: ActionBegan, at: Seconds) -> None:
         if began.action == "speak" and not self._scene.is_listening(began.behavior):
-            self.take(at, lambda talk: talk.pair.forget_unanswered(at))
+            self.take(at, lambda talk: talk.exchange.pair.forget_unanswered(at))
 
     def robot_stops(self, action: Action, at: Seconds) -> None:
         if not self.is_under_way:
@@ -432,12 +394,12 @@ class Talk(KindRecognizer):
         """True if somebody else may have answered the robot before `at`. In its turn each who interrupts answers."""
         return not self._conversation.is_into_turn(at) and self._scene.is_contested(self.id, at)
 
-    @property
     def _is_behind_others(self) -> bool:
         """True if the first in line waits until it is known whether somebody else has answered before."""
         since, (at, first) = self.undecided_since, self._line[0]
-        if any(each.began <= at and not self.may_answer_before(each) for each in self._writer.answered):
-            return True  # it is to be told first that this has answered for all
+        for each in self._writer.answered:
+            if each.began <= at and not self.may_answer_before(each):
+                return True  # it is to be told first that this has answered for all
         if since is None or isinstance(first, CutOff):
             return since is not None and self._scene.is_contested(self.id, since)
         return self._waits_for_others(since)
@@ -447,7 +409,6 @@ class Talk(KindRecognizer):
         speeches = [each for _, each in self._line if isinstance(each, OwnSpeech)]
         return [each for each in speeches if not each.is_decided and (each.to is None or each.may_be_noise)]
 
-    @property
     def _undecided_first(self) -> OwnSpeech | None:
         """The first in line, if it is a speech that is not decided; None: it is to be told next."""
         first = self._line[0][1]
@@ -467,24 +428,6 @@ class Talk(KindRecognizer):
         """True if it is known to whom the first speech in line is, and that it is one."""
         return speech.is_decided or (speech.to is not None and not self._may_be_noise(speech))
 
-    def _find(self, speech: OwnSpeech, at: Seconds) -> bool:
-        """Decide to whom the speech is if that is certain."""
-        speech.company |= self._scene.company(self.id)
-        is_line = self._scene.lines.get(self.id) == speech.since
-        to = certain(speech, self._scene.robot, self._scene.names, is_line=is_line)
-        if to is not None and to != speech.to:
-            self._address(speech, to, at)
-        return to is not None
-
-    def _address(self, speech: OwnSpeech, to: Addressees, at: Seconds) -> None:
-        speech.to = to
-        if self._scene.robot not in to:
-            speech.is_open = False
-            self._writer.decide_interjection(self.id, speech.since, "other", at)
-        elif speech.until is None:
-            self._may_interrupt(speech, "", at)
-        self._scene.note_spoken(speech, at)
-
     def _queue(self, at: Seconds, speech: OwnSpeech) -> None:
         is_next = speech.is_to(self._scene.robot) and self._waits_for_others(at)
         if self._line or not self._is_known(speech) or is_next:
@@ -499,7 +442,8 @@ class Talk(KindRecognizer):
             self._conversation.speaks(speech.part, beside=speech.is_beside)
             is_sign = self._conversation.listener.listens_to(speech.part)
             speech.is_open &= is_sign
-            self._is_known_speech(speech, is_known=not is_sign)
+            if not is_sign:
+                self.speeches.is_no_noise(speech)
 
     def _decide(self, speech: OwnSpeech, at: Seconds) -> None:
         """Decide what the sound is, by what was known when it was due: nothing, or to whom it is."""
@@ -508,30 +452,26 @@ class Talk(KindRecognizer):
         is_judged_here = not self._is_into_words(speech) or self._scene.robot not in to
         is_noise = is_judged_here and speech.may_be_noise and speech.until is not None
         speech.is_decided = True
-        self._is_known_speech(speech, is_known=is_judged_here)
+        if is_judged_here:
+            self.speeches.is_no_noise(speech)
         if is_noise:
             speech.is_noise, speech.is_open, speech.to = True, False, NOBODY
             self._writer.decide_interjection(self.id, speech.since, "noise", at)
         elif speech.to is None:
-            self._address(speech, to, at)
+            self.speeches.address(speech, to, at)
 
     def _likely(self, speech: OwnSpeech, at: Seconds) -> Addressees:
         """Addressees of a speech by what is likely."""
-        if speech.until is None:
-            speech.faces.turns(speech.faces.face, at)
         pair = self._conversation.exchange.pair
         waits = pair.may_be_answered_with("speak") and in_time(speech.since, pair.deadline)
-        awaited_by = frozenset((self._scene.robot,)) if waits else NOBODY
-        is_untold = self._scene.tells_addressees and not says_words(speech.words)
-        within = self._config.adjacency_pair_limit
-        return likely(speech, self._scene.spoken, by=at, within=within, awaited_by=awaited_by, is_untold=is_untold)
+        return self.speeches.likely(speech, at, frozenset((self._scene.robot,)) if waits else NOBODY)
 
     def may_go_on(self, now: Seconds) -> bool:
         """True if it is decided by `now` to whom the first speech in line is, or if what is decided may be told."""
         if not self._line:
             return False
-        speech = self._undecided_first
-        return not self._is_behind_others if speech is None else self._decided_at(speech) <= now
+        speech = self._undecided_first()
+        return not self._is_behind_others() if speech is None else self._decided_at(speech) <= now
 
     def go_on(self, now: Seconds) -> None:
         """Tell all in line up to the next speech of which it is not known to whom it is."""
@@ -541,12 +481,12 @@ class Talk(KindRecognizer):
             if isinstance(item, OwnSpeech):
                 self._conversation.listener.next_begins()
                 self._catch_up(at)  # the sign may have held the pair
-            if (speech := self._undecided_first) is not None:
+            if (speech := self._undecided_first()) is not None:
                 if self._decided_at(speech) > now:
                     break
                 self._decide(speech, now)
                 continue
-            if self._is_behind_others:
+            if self._is_behind_others():
                 break
             self._line.popleft()
             if isinstance(item, OwnSpeech):

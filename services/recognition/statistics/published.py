@@ -7,7 +7,7 @@ the numbers of the end only, as after a replay, asks for them then (`overall`), 
 """
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Collection, Mapping, Set
 from functools import partial
 from math import inf, isfinite
 
@@ -83,7 +83,7 @@ class PublishedStatistics:
 
     def feed(
         self,
-        changes: Iterable[ConnectionEvent | PersonForgotten],
+        changes: Collection[ConnectionEvent | PersonForgotten],
         busy: Set[str],
         now: Seconds,
         contacts: Mapping[str, Probability | None] = {},
@@ -94,6 +94,8 @@ class PublishedStatistics:
         busy: persons with a task in hand. contacts: how much of a contact there is now, where that may have changed.
         heads: what is known of people's heads, where that has changed.
         """
+        if busy == self._busy and not (changes or contacts or heads or self._held_busy):
+            return
         for actor, head in heads.items():
             self._actors[actor].head, self._actors[actor].is_new = head, True
             self._changed.add(actor)
