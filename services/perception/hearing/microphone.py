@@ -54,8 +54,9 @@ def is_file(source: str | tuple[str, ...]) -> bool:
 
 
 def read_file(path: Path, channels: int) -> Samples:
-    """Read a WAV file. channels: that it has to have at least; 1: the mean of all that it has, since a voice may be in
-    any of them. Raises InputRefused: it cannot be read.
+    """Read a WAV file. Raises InputRefused: it cannot be read.
+
+    channels: that it has to have at least; 1: the mean of all that it has, since a voice may be in any of them.
     """
     try:
         with path.open("rb") as file:
