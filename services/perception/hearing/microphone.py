@@ -67,7 +67,7 @@ def read_file(path: Path, channels: int) -> Samples:
         reason = f"it has {samples.shape[1]} channels, and `hearing.people` names {channels}"
         raise InputRefused(Fault(reason=reason, where=str(path)))
     if channels == 1:
-        return np.rint(samples.mean(axis=1, keepdims=True)).astype(np.int16)
+        samples = np.rint(samples.mean(axis=1, keepdims=True)).astype(np.int16)
     return samples[:, :channels]
 
 
