@@ -88,7 +88,7 @@ class Guarded:
         programs = scope["path"] in self._for_programs
         refused = refusal(scope["headers"], self._hosts, socket=socket, programs=programs)
         if refused is None:
-            await self._app(scope, receive, send if socket else _with_headers(send))
+            await self._app(scope, receive, _while_linked(send) if socket else _with_headers(send))
         elif socket:
             await send({"type": "websocket.close", "code": REFUSED, "reason": refused[1]})
         else:
@@ -104,6 +104,22 @@ def _with_headers(send: Send) -> Send:
         if message["type"] == "http.response.start":
             message["headers"] = [*message.get("headers", ()), *HEADERS]
         await send(message)
+
+    return sending
+
+
+def _while_linked(send: Send) -> Send:
+    """Make sending to a WebSocket end in OSError, as to any that has gone, where the server has ended it already.
+
+    It does so by itself, as for a frame that is too large or no answer to its pings, and says RuntimeError to who
+    sends before they have heard of that.
+    """
+
+    async def sending(message: MutableMapping[str, Any]) -> None:
+        try:
+            await send(message)
+        except RuntimeError as error:
+            raise OSError(str(error)) from error
 
     return sending
 

@@ -2,12 +2,13 @@
 
 import importlib.util
 from collections.abc import Iterator
+from typing import Any
 from urllib.parse import urlsplit
 
 import aiohttp
 import pytest
 
-from engage_hri.services.web.guard import Hosts, refusal
+from engage_hri.services.web.guard import Guarded, Hosts, refusal
 from tests.bus.places import free_endpoint
 from tests.console.browser import waited
 from tests.console.windows import URL, engage
@@ -63,6 +64,21 @@ def test_no_page_from_elsewhere_is_served(origin: str | None, served: bool) -> N
     assert (status(Hosts(LOCAL), host, origin) == 0) == served
     assert (status(Hosts(LOCAL), host, origin, socket=True, programs=True) == 0) == served
     assert (status(Hosts(LOCAL), host, origin, socket=True) == 0) == (served and origin is not None)
+
+
+async def test_a_link_that_the_server_has_ended_is_one_that_has_gone() -> None:
+    """As uvicorn: after a frame that is too large it takes no more, before its application knows."""
+
+    async def app(scope: Any, receive: Any, send: Any) -> None:
+        with pytest.raises(OSError, match="after sending"):
+            await send({"type": "websocket.send", "text": "so"})
+
+    async def server(message: Any) -> None:
+        raise RuntimeError("Unexpected ASGI message 'websocket.send', after sending 'websocket.close'.")
+
+    own = [(b"host", b"127.0.0.1:8137"), (b"origin", b"http://127.0.0.1:8137")]
+    scope = {"type": "websocket", "path": "/voice", "headers": own}
+    await Guarded(app, Hosts(LOCAL))(scope, server, server)  # type: ignore[arg-type]
 
 
 def test_of_two_headers_none_is_overlooked() -> None:

@@ -135,6 +135,25 @@ async def test_without_a_seat_there_is_no_microphone_and_it_ends_with_the_seat(h
     assert page.closed == (4403, "you have left your seat")
 
 
+async def test_a_link_that_was_cut_tells_no_end_of_the_one_that_the_page_has_made_since(hub: MemoryHub) -> None:
+    async with window(hub) as place:
+        place.seated["s"] = Seated("ann")
+        ear = hub.join("hearing", "perception").subscribe(keys.ANY_SOUND)
+        cut, cut_too, page = [await place.microphone("s") for _ in range(3)]
+        page.sound(place.bus.now(), number=1)
+        cut.go()  # seen long after, as nothing comes any more
+        cut_too.sound(place.bus.now(), number=99)
+        await asyncio.sleep(0.1)
+        page.sound(place.bus.now(), number=2)
+        page.go()
+        await asyncio.sleep(0.1)
+        heard = [received for _ in range(len(ear)) if (received := await ear.next()) is not None]
+
+    frames = [each.message for each in heard if isinstance(each.message, SoundFrame)]
+    assert [(frame.number, bool(frame.samples)) for frame in frames] == [(1, True), (2, True), (3, False)]
+    assert cut_too.closed == (4403, "you have it on elsewhere")
+
+
 @pytest.mark.parametrize(
     ("samples", "at"),
     [(b"", 0.0), (b"abc", 0.0), (bytes(2 * 16000), 0.0), (FRAME, float("nan")), (FRAME, float("inf"))],

@@ -111,6 +111,17 @@ async def test_a_voice_is_told_with_the_instants_at_which_it_could_be_heard(hub:
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize("side", [0, 1])
+async def test_one_person_is_heard_in_whichever_channel_of_a_file(hub: MemoryHub, tmp_path: Path, side: int):
+    said = spoken("the blue one").samples
+    path = write_wav(tmp_path / "said.wav", *([said, 0 * said] if side == 0 else [0 * said, said]))
+
+    async with hearing(hub, source=str(path), **sphinx()) as heard:
+        await heard.over.wait()
+
+    assert [each.text for each in heard.of(Utterance, final=True)] == ["the blue one"]
+
+
 async def test_words_are_announced_before_the_voice_and_known_soon_after_it(hub: MemoryHub, tmp_path: Path):
     path = write_wav(tmp_path / "said.wav", spoken("the blue one").samples)
 

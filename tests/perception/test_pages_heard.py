@@ -10,7 +10,7 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.perception import ActorFound, ActorLost, Utterance
+from engage_hri.schemas.perception import ActionBegan, ActorFound, ActorLost, Utterance
 from engage_hri.schemas.sound import SoundFrame
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
@@ -18,6 +18,7 @@ from engage_hri.services.client.people.perceive import perceive
 from engage_hri.services.perception.hearing.microphone import SILENT
 from engage_hri.services.perception.hearing.pages import MOST_PAGES
 from engage_hri.services.perception.hearing.voice import RATE, Samples
+from engage_hri.services.runtime.service import Ready
 from tests.perception.spoken import placed, spoken, voice
 from tests.perception.test_hearing import Heard, hearing, sphinx
 
@@ -65,6 +66,21 @@ async def test_the_voice_is_that_of_the_person_at_the_page_with_its_instants_and
     assert heard.of(Utterance, final=True)[0].text == "the blue one"
     assert heard.of(Fault) == []
     assert not heard.of(ActorLost, actor="visitor")
+
+
+async def test_sound_of_a_page_that_comes_too_early_is_not_taken_for_the_robots_voice(hub: MemoryHub):
+    """The robot speaks with a voice that does not tell what it plays: nobody is heard then, and that is told."""
+
+    async def speaks(bus: Bus, ready: Ready) -> None:
+        ready()
+        await asyncio.sleep(1.0)
+        bus.publish(keys.ROBOT_ACTION, ActionBegan(actor=bus.robot, action="speak", at=bus.stamp()))
+        await asyncio.get_running_loop().create_future()
+
+    async with hearing(hub, speaks, source="page") as heard:
+        await send(hub.join("console", role="wizard"), "ann", np.zeros(2 * RATE, np.int16))
+
+    assert ["nobody is heard while the robot speaks" in fault.reason for fault in heard.of(Fault)] == [True]
 
 
 async def test_people_at_several_pages_are_heard_at_once(hub: MemoryHub):

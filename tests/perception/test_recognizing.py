@@ -3,6 +3,7 @@
 import re
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -70,6 +71,30 @@ def test_a_speech_at_which_an_engine_fails_is_given_up_and_the_next_is_heard():
     assert failed.fault.reason == "the recognizer fails: RuntimeError: oops"
     assert [*desk.take(SpeechOrder(1, sound(10))), *desk.take(SpeechOrder(1, b""))] == []
     assert [*desk.take(SpeechOrder(2, b""))] == [KnownWords(2, SpeechWords("0 in all", 0.5), final=True)]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (SpeechWords("so", np.float32(0.5)), SpeechWords("so", 0.5)),  # type: ignore[arg-type]
+        (SpeechWords("s\udc80"), SpeechWords("s?")),
+        (SpeechWords("so", 2.0), "a confidence of 2: expected 0 to 1"),
+        (SpeechWords("so", float("nan")), "a confidence of nan: expected 0 to 1"),
+        (None, "'NoneType' object has no attribute"),
+    ],
+)
+def test_what_an_engine_answers_is_words_that_can_be_told_or_has_failed(words: Any, told: SpeechWords | str):
+    class Odd(SpeechRecognizer):
+        def listen(self) -> Listening:
+            return Whole(lambda samples: words)
+
+    [answer] = Desk(Odd(RecognizerSettings())).take(SpeechOrder(1, b""))
+    if isinstance(answer, NotUnderstood):
+        assert isinstance(told, str)
+        assert told in answer.fault.reason
+    else:
+        assert answer == KnownWords(1, told, final=True)  # type: ignore[arg-type]
+        assert type(answer.words.confidence) is float
 
 
 def test_a_whole_speech_is_understood_at_its_end():

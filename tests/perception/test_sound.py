@@ -43,15 +43,26 @@ def test_what_is_no_wav_file_of_16_bits_is_refused_with_what_to_do():
         with pytest.raises(InputRefused, match=reason) as refused:
             read_wav(io.BytesIO(content), "a.wav")
         assert "ffmpeg" in refused.value.fault.advice
+    with pytest.raises(InputRefused, match="8 bits, not 16"):
+        read_wav(io.BytesIO(written(width=1)), "a.wav")
+
+
+@pytest.mark.parametrize("rate", [0, 1, 4_000_000_000])
+def test_a_file_with_a_rate_that_no_sound_has_is_refused(rate: int):
+    whole = written()
+    damaged = whole[:24] + rate.to_bytes(4, "little") + whole[28:]
+    with pytest.raises(InputRefused, match=f"says that it has {rate} samples per second: expected 4000 to 192000"):
+        read_wav(io.BytesIO(damaged), "a.wav")
+
+
+def written(width: int = 2) -> bytes:
     file = io.BytesIO()
     with wave.open(file, "wb") as written:
         written.setnchannels(1)
-        written.setsampwidth(1)
+        written.setsampwidth(width)
         written.setframerate(8000)
         written.writeframes(bytes(100))
-    file.seek(0)
-    with pytest.raises(InputRefused, match="8 bits, not 16"):
-        read_wav(file, "a.wav")
+    return file.getvalue()
 
 
 @given(st.integers(0, 999), st.floats(-1e-4, 1e-4))

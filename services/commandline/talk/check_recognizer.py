@@ -149,16 +149,11 @@ def _heard(spoken: SpokenFile, recognizer: "SpeechRecognizer", config: "HearingC
     """Let it hear a file as if it came in real time. Raises InputRefused, RunFailed."""
     import numpy as np
 
-    from engage_hri.services.perception.hearing.microphone import PIECE
+    from engage_hri.services.perception.hearing.microphone import PIECE, read_file
     from engage_hri.services.perception.hearing.recognizing import Desk, NotUnderstood, SpeechOrder
-    from engage_hri.services.perception.hearing.sound import read_wav
     from engage_hri.services.perception.hearing.voice import RATE, VoiceBegan, VoiceEar, VoiceSound, silero
 
-    try:
-        with open(spoken.file, "rb") as file:
-            sound = read_wav(file, spoken.file)[:, 0]
-    except OSError as error:
-        raise InputRefused(Fault(reason=error.strerror or str(error), where=spoken.file)) from error
+    sound = read_file(Path(spoken.file), 1)[:, 0]
     samples = np.concatenate([np.zeros(round(SILENCE * RATE), sound.dtype), sound])
     ear, desk, step = VoiceEar(silero(), config.pause), Desk(recognizer), round(PIECE * RATE)
     speech = heard = 0

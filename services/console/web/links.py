@@ -52,6 +52,9 @@ class PageLinks:
     def __init__(self, bus: Bus, visitor: Callable[[str], Visitor | None]) -> None:
         self._bus, self._visitor = bus, visitor
         self._links = 0
+        self._newest: dict[str, WebSocket] = {}
+        """The newest link of each person. A link that was cut on its way is seen to be dead only after a while: what
+        it tells then, and its end, is no news of the one that the page has made meanwhile."""
 
     async def _linked(self, page: WebSocket, serve: Callable[[WebSocket], Coroutine[Any, Any, None]]) -> None:
         """Serve a page, until it goes, if there is room."""
@@ -68,6 +71,7 @@ class PageLinks:
             await page.close(NOT_YOURS, str(error)[:120])
         finally:
             self._links -= 1
+            self._newest = {person: link for person, link in self._newest.items() if link is not page}
 
     async def _seated(self, page: WebSocket, device: str) -> Visitor | None:
         """Find the one who sits at a page; else close the link. device: what it would be the link of, in words."""
@@ -75,7 +79,20 @@ class PageLinks:
         if visitor is None or not visitor.person:
             await page.close(NOT_YOURS, f"take a seat first: {device} is that of a person")
             return None
+        self._newest[visitor.person] = page
         return visitor
+
+    def _is_newest(self, page: WebSocket, person: str) -> bool:
+        """Tell whether a person has made no other link of this kind since this one."""
+        return self._newest.get(person) is page
+
+    async def _still_seated(self, page: WebSocket, visitor: Visitor, person: str) -> bool:
+        """Tell whether a link is still that of the person at the page; else close it."""
+        if visitor.person == person and self._is_newest(page, person):
+            return True
+        left = visitor.person != person
+        await page.close(NOT_YOURS, "you have left your seat" if left else "you have it on elsewhere")
+        return False
 
     async def _received(self, page: WebSocket, unheard: Callable[[], str] = lambda: "") -> bytes:
         """Wait for what a page sends, and tell the time meanwhile, and why nobody takes it.

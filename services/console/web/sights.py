@@ -25,7 +25,7 @@ from engage_hri.schemas.landmarks import FACE_POINTS, MOST_FACES, FaceLandmarks,
 from engage_hri.schemas.perception import HeadPose
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.console.web.links import NONSENSE, NOT_YOURS, TOO_MUCH, PageLinks
+from engage_hri.services.console.web.links import NONSENSE, TOO_MUCH, PageLinks
 from engage_hri.services.console.web.visitor import Visitor
 from engage_hri.services.runtime.packages import data_folder
 from engage_hri.services.runtime.parcels import PARCELS
@@ -82,8 +82,7 @@ class Sights(PageLinks):
         try:
             while True:
                 content = await self._received(page, lambda: unseen(self._bus, key))
-                if visitor.person != person:
-                    await page.close(NOT_YOURS, "you have left your seat")
+                if not await self._still_seated(page, visitor, person):
                     return
                 told = self._of_page(content)
                 if told is None:
@@ -99,7 +98,8 @@ class Sights(PageLinks):
         finally:
             following.cancel()
             await asyncio.wait([following])
-            self._bus.publish(key, replace(last, at=self._bus.stamp(), faces=(), over=True))
+            if self._is_newest(page, person):
+                self._bus.publish(key, replace(last, at=self._bus.stamp(), faces=(), over=True))
 
     async def _follow(self, visitor: Visitor, person: str) -> None:
         """Let the one at the page be where eyes see them, and look where their head says; until cancelled."""

@@ -17,7 +17,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.sound import SoundFrame
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Received
-from engage_hri.services.console.web.links import NONSENSE, NOT_YOURS, TOO_MUCH, PageLinks
+from engage_hri.services.console.web.links import NONSENSE, TOO_MUCH, PageLinks
 from engage_hri.services.runtime.installation import extra_command, has_hearing
 
 WAITING = 64
@@ -90,8 +90,7 @@ class Sounds(PageLinks):
         try:
             while True:
                 content = await self._received(page, lambda: unheard(self._bus, key))
-                if visitor.person != person:
-                    await page.close(NOT_YOURS, "you have left your seat")
+                if not await self._still_seated(page, visitor, person):
                     return
                 frame = self._of_page(content)
                 if frame is None:
@@ -105,7 +104,8 @@ class Sounds(PageLinks):
                 if self._bus.now() - frame.at.seconds < LATEST:
                     self._bus.publish(key, frame)
         finally:
-            self._bus.publish(key, SoundFrame(at=self._bus.stamp(), rate=RATE, number=numbers + 1))
+            if self._is_newest(page, person):
+                self._bus.publish(key, SoundFrame(at=self._bus.stamp(), rate=RATE, number=numbers + 1))
 
     def _of_page(self, content: bytes) -> SoundFrame | None:
         """The sound in what a page has sent; None: it is none. It was not picked up later than now."""

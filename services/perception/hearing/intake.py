@@ -2,7 +2,9 @@
 
 from collections.abc import Iterable
 
+from engage_hri.schemas import keys
 from engage_hri.schemas.participants import PeerAlive
+from engage_hri.schemas.sound import SoundFrame
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Received, Subscription
 from engage_hri.services.perception.hearing.company import HeardPeople
@@ -19,7 +21,9 @@ class HearingIntake:
         self._bus, self.inbox, self._people, self._speeches = bus, inbox, people, speeches
 
     def take(self, received: Received) -> None:
-        """Take one message."""
+        """Take one message. Sound of a page is nothing here: it comes before anybody listens to pages."""
+        if isinstance(received.message, SoundFrame) and received.key != keys.ROBOT_SOUND:
+            return
         with self._bus.containing(received):
             self._people.take(received)
             self._speeches.take(received.message)

@@ -54,7 +54,10 @@ def is_file(source: str | tuple[str, ...]) -> bool:
 
 
 def read_file(path: Path, channels: int) -> Samples:
-    """Read a WAV file. channels: that it has to have at least. Raises InputRefused: it cannot be read."""
+    """Read a WAV file. Raises InputRefused: it cannot be read.
+
+    channels: that it has to have at least; 1: the mean of all that it has, since a voice may be in any of them.
+    """
     try:
         with path.open("rb") as file:
             samples = read_wav(file, str(path))
@@ -63,6 +66,8 @@ def read_file(path: Path, channels: int) -> Samples:
     if samples.shape[1] < channels:
         reason = f"it has {samples.shape[1]} channels, and `hearing.people` names {channels}"
         raise InputRefused(Fault(reason=reason, where=str(path)))
+    if channels == 1:
+        samples = np.rint(samples.mean(axis=1, keepdims=True)).astype(np.int16)
     return samples[:, :channels]
 
 

@@ -145,20 +145,24 @@ class Desk:
             listening, told = self._speeches.get(order.speech) or (self._recognizer.listen(), "")
             self._speeches[order.speech] = listening, told
             if order.samples:
-                text = (
-                    "" if listening is None else " ".join(listening.hear(np.frombuffer(order.samples, "<i2")).split())
-                )
+                text = "" if listening is None else _plain(listening.hear(np.frombuffer(order.samples, "<i2")))
                 if text and text != told:
                     self._speeches[order.speech] = listening, text
                     yield KnownWords(order.speech, SpeechWords(text), final=False)
             elif listening is not None:
                 words = listening.end()
-                yield KnownWords(
-                    order.speech, SpeechWords(" ".join(words.text.split()), words.confidence), final=True
-                )
+                confidence = float(words.confidence)  # of an engine's own kind of number
+                if not 0.0 <= confidence <= 1.0:
+                    raise ValueError(f"a confidence of {confidence:g}: expected 0 to 1")
+                yield KnownWords(order.speech, SpeechWords(_plain(words.text), confidence), final=True)
         except Exception as error:  # whatever an engine raises: it ends this speech, and no other
             self._speeches[order.speech] = None, ""
             reason = f"the recognizer fails: {type(error).__name__}: {error}"
             yield NotUnderstood(order.speech, error.fault if isinstance(error, EngageError) else Fault(reason=reason))
         if not order.samples:
             del self._speeches[order.speech]
+
+
+def _plain(text: str) -> str:
+    """A text as it can be sent: engines leave spaces, and halves of letters where a model was cut off in one."""
+    return " ".join(text.split()).encode(errors="replace").decode()

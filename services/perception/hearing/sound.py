@@ -12,6 +12,8 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.perception.hearing.voice import RATE, Samples
 
 ADVICE = "make it one: ffmpeg -i FILE -ar 16000 -c:a pcm_s16le FILE.wav"
+RATES = range(4000, 192_001)
+"""Samples per second that a file may have, as those of a `SoundFrame`: what says another number is damaged."""
 TAPS = 16
 """Zero crossings of the filter on each side of a sample, where the rate is changed."""
 AT_ONCE = 1 << 15
@@ -28,7 +30,7 @@ class Piece(Struct, frozen=True):
 def read_wav(file: BinaryIO, name: str) -> Samples:
     """Read a WAV file, at `RATE`: a row for each instant, a column for each channel.
 
-    file: open. name: for people. Raises InputRefused: it is no WAV file with samples of 16 bits.
+    file: open. name: for people. Raises InputRefused: it is no WAV file with samples of 16 bits, or of such a rate.
     """
     try:
         with wave.open(file) as read:
@@ -39,6 +41,9 @@ def read_wav(file: BinaryIO, name: str) -> Samples:
         raise InputRefused(Fault(reason=reason, where=name, advice=ADVICE)) from error
     if width != 2:
         raise InputRefused(Fault(reason=f"its samples have {8 * width} bits, not 16", where=name, advice=ADVICE))
+    if rate not in RATES:
+        reason = f"it says that it has {rate} samples per second: expected {RATES[0]} to {RATES[-1]}"
+        raise InputRefused(Fault(reason=reason, where=name, advice=ADVICE))
     whole = len(content) - len(content) % (2 * channels)
     samples = np.frombuffer(content[:whole], "<i2").reshape(-1, channels)
     return np.column_stack([resampled(samples[:, channel], rate) for channel in range(channels)])
