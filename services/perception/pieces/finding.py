@@ -27,7 +27,8 @@ from engage_hri.services.perception.eyes.camera import StatedCamera
 from engage_hri.services.perception.eyes.looking import Floats
 from engage_hri.services.perception.pictures import Image
 from engage_hri.services.perception.pieces.colors import TABLE, Palette
-from engage_hri.services.perception.pieces.spotting import SpottedPiece
+from engage_hri.services.perception.pieces.hands import HandFinder
+from engage_hri.services.perception.pieces.spotting import SpottedHand, SpottedPiece
 
 Labels = NDArray[np.int8]
 STEP: Meters = 0.0015
@@ -91,6 +92,14 @@ class _Laid(NamedTuple):
     turn_spread: float = math.inf
 
 
+class FoundOnTable(NamedTuple):
+    """What is found in a picture. bare: ids of pieces where the bare table is seen now that were seen before."""
+
+    pieces: tuple[SpottedPiece, ...]
+    bare: tuple[str, ...]
+    hands: tuple[SpottedHand, ...]
+
+
 class _Seen(NamedTuple):
     """A picture, laid out flat. value: 1 where a color is, -1 where another one is. tops: the same, less on walls."""
 
@@ -118,7 +127,7 @@ class FlatTable:
         inside = np.zeros((self.rows, self.columns), np.uint8)
         cv2.fillConvexPoly(inside, np.rint(self.at(corners)[:, ::-1]).astype(np.int32), 1)
         self.is_table = np.asarray(cv2.erode(inside, np.ones((5, 5), np.uint8)), np.uint8)  # its edge is of no color
-        self.eye = np.array(eye[:2], float)
+        self.eye, self.height = np.array(eye[:2], float), eye[2] - top
         self.sunk = (eye[2] - top) / (eye[2] - z)
         """Scale about the eye that brings an outline on the table to where the plane of the tops shows it."""
 
@@ -216,12 +225,13 @@ class PieceFinder:
         self._flat, self._palette = flat, palette
         self._names = [*palette]
         self._shapes = [_Shape(form) for form in table.pieces]
+        self._hands = HandFinder(flat.is_table, flat.low, STEP, flat.eye, flat.height)
         self._last: dict[str, Floats] = {}
         """Pose in which each was seen last."""
         self._count = 0
 
-    def find(self, image: Image) -> tuple[list[SpottedPiece], list[str]]:
-        """Find the pieces in the next picture. Returns also the ids of those where the bare table is seen now."""
+    def find(self, image: Image) -> FoundOnTable:
+        """Find the pieces in the next picture, and the hands."""
         flat = self._flat.laid_out(image)
         around = light(flat, self._palette[TABLE])
         labels = labeled(flat, around, self._palette)
@@ -234,7 +244,9 @@ class PieceFinder:
         bare = [shape.form.id for shape in away if self._is_bare(flat, around, shape)]
         self._last |= {piece.id: np.array([piece.x, piece.y, piece.yaw]) for piece in found}
         self._count += 1
-        return found, bare
+        bare_table = np.maximum(around * np.array(self._palette[TABLE], np.float32), 1)
+        hands = self._hands.find(flat / bare_table, (flat.max(2) > 0).astype(np.float32))
+        return FoundOnTable(tuple(found), tuple(bare), tuple(hands))
 
     def _is_bare(self, flat: Any, around: Any, shape: _Shape) -> bool:
         """Tell whether the table is seen where a form lay last.

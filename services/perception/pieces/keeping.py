@@ -13,7 +13,7 @@ seen? Then somebody holds it, and it is left out; who remembers the world takes 
 
 import math
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from statistics import median
 
 from msgspec import Struct
@@ -23,7 +23,7 @@ from engage_hri.schemas.footprints import PiecePose
 from engage_hri.schemas.tables import Form, TaskTable
 from engage_hri.schemas.units import Meters, Probability, Radians, Seconds
 from engage_hri.schemas.world import Entity
-from engage_hri.services.perception.pieces.spotting import SpottedPiece, SpottedPieces
+from engage_hri.services.perception.pieces.spotting import HEIGHT, SpottedHand, SpottedPiece, SpottedPieces
 
 AWAY: Meters = 0.004
 """Distance, and turn, from which on a piece is elsewhere."""
@@ -39,6 +39,9 @@ FEWEST = 3
 """Pictures of a piece at rest from which on their median counts."""
 STILL = 0.03
 """Metres per second: a piece that is faster moves."""
+REACH: Meters = 0.15
+SWIFT = 1.5
+"""Distance, and more for each second, at which a hand is the same from one picture to the next."""
 COVERED: Probability = 0.3
 """Confidence in where a piece lies that is not seen."""
 PATIENCE: Seconds = 0.4
@@ -86,6 +89,51 @@ class PieceKeeper:
                 confidence = COVERED if kept.is_covered else _confidence(kept.pose.seen)
                 lying = self._table.lying(kept.form, pose)
                 yield replace(lying, confidence=confidence, velocity=(*kept.velocity, 0.0))
+
+
+class HandKeeper:
+    """The hands over a table: each is of the person who is nearest to where it comes over the edge.
+
+    One that comes from the side of the robot is its own, and is not told.
+    """
+
+    def __init__(self, table: TaskTable) -> None:
+        self._height = table.surface.center[2] + HEIGHT
+        self._half = math.hypot(*table.surface.center[:2])
+        self._hands: tuple[Entity, ...] = ()
+        self._at: Seconds = -math.inf
+
+    def feed(self, hands: Sequence[SpottedHand], people: Sequence[Entity], at: Seconds) -> tuple[Entity, ...]:
+        """Take the hands of a picture. Returns them as they are to be told."""
+        past, before = at - self._at, list(self._hands)
+        told: list[Entity] = []
+        for hand in hands:
+            comes = hand.from_x, hand.from_y
+            if math.hypot(*comes) < self._half:
+                continue
+            place = hand.x, hand.y, self._height
+            near = min(before, key=lambda each: math.dist(each.position, place), default=None)
+            if near is not None and math.dist(near.position, place) < REACH + SWIFT * past:
+                before.remove(near)
+                vx, vy, _ = ((b - a) / past for a, b in zip(near.position, place, strict=True))
+                told.append(replace(near, position=place, velocity=(vx, vy, 0.0)))
+            else:
+                owner = min(people, key=lambda each: math.dist(each.position[:2], comes), default=None)
+                told.append(Entity(id="", kind="hand", owner=owner.id if owner else "", position=place))
+        self._hands, self._at = tuple(_named(told)), at
+        return self._hands
+
+
+def _named(hands: Iterable[Entity]) -> Iterator[Entity]:
+    """Give those an id that have none: the first that nobody has."""
+    hands = [*hands]
+    taken = {each.id for each in hands}
+    for hand in hands:
+        name = f"{hand.owner}-hand" if hand.owner else "hand"
+        free = (id for id in (name, *(f"{name}-{k}" for k in range(2, 9))) if id not in taken)
+        named = hand if hand.id else replace(hand, id=next(free))
+        taken.add(named.id)
+        yield named
 
 
 def _turned_alike(kept: _Kept, piece: SpottedPiece) -> SpottedPiece:
