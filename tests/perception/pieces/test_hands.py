@@ -1,4 +1,4 @@
-"""Hands over a drawn table: found by where they come from, whoever's skin it is, and told as the person's they are."""
+"""Hands over a drawn table: found by where they come from, whatever their skin, and told as hands of a person."""
 
 import math
 
