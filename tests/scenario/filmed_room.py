@@ -69,8 +69,8 @@ REACH = 0.1
 HANDS: tuple[HandSide, ...] = ("left", "right")
 TAKES = 4
 """Pictures of a table that stays as it is in which pieces are found anew."""
-WORDS = {"step-2": "hello", "step-4": "okay", "step-25": "thank you very much"}
-"""What the person says after these steps. Appendix B has them say nothing."""
+WORDS = {"step-5": "okay", "step-16-ours": "this one here", "step-21": "yes", "step-25": "thank you very much"}
+"""What the person says after these steps, in which the robot waits for them. Appendix B has them say nothing."""
 ANSWERING: Seconds = 0.4
 ECHOES = 0.05, 0.3
 """Of the robot's voice in the room: delay, and time in which echoes fall by 60 dB."""
