@@ -51,10 +51,10 @@ class HandFinder:
         """The table as it was without hands, as shares of how it looks bare. A hand that is there from the first
         picture on is seen when it moves."""
 
-    def find(self, shares: Any, seen: Any) -> list[SpottedHand]:
+    def find(self, shares: Any, seen: Any) -> tuple[list[SpottedHand], Any]:
         """Find the hands in the next picture. shares: of each pixel, of how the bare table would look there.
 
-        seen: which pixels the picture has.
+        seen: which pixels the picture has. Returns also which pixels hands and arms cover.
         """
         now = cv2.GaussianBlur(cv2.resize(shares, self._size, interpolation=cv2.INTER_AREA), (0, 0), 1.0)
         is_seen = self._is_table & (cv2.resize(seen, self._size, interpolation=cv2.INTER_AREA) == 1)
@@ -73,7 +73,7 @@ class HandFinder:
                 covered |= own.astype(np.uint8)
         free = cv2.dilate(covered, np.ones((5, 5), np.uint8)) == 0
         self._before[free] = now[free]
-        return found
+        return found, cv2.resize(covered, shares.shape[1::-1], interpolation=cv2.INTER_NEAREST)
 
     def _changed(self, now: Any, is_seen: Any) -> Any:
         """Where something is on the table that was not there before, and is no shadow."""
