@@ -35,7 +35,8 @@ class Thing(Struct, frozen=True):
 class PersonShown(Struct, frozen=True):
     """A person. at: the face; None: the world does not say where.
 
-    looks: ids of what they look at; empty: away; None: nobody says. one_of: it is one of these. points, acts: ids. present: False: gone.
+    looks: ids of what they look at; empty: away; None: nobody says. one_of: it is one of these. points, acts: ids.
+    present: False: gone.
     """
 
     id: str
