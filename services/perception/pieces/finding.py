@@ -251,12 +251,12 @@ class PieceFinder:
             found += self._of_color(flat, labels, covered, self._names.index(color), shapes)
         ids = {piece.id for piece in found}
         away = [shape for shape in self._shapes if shape.form.id not in ids]
-        bare = [shape.form.id for shape in away if self._is_bare(flat, around, shape)]
+        bare = [shape.form.id for shape in away if self._is_bare(flat, around, covered, shape)]
         self._last |= {piece.id: np.array([piece.x, piece.y, piece.yaw]) for piece in found}
         self._count += 1
         return FoundOnTable(tuple(found), tuple(bare), tuple(hands))
 
-    def _is_bare(self, flat: Any, around: Any, shape: _Shape) -> bool:
+    def _is_bare(self, flat: Any, around: Any, covered: Any, shape: _Shape) -> bool:
         """Tell whether the table is seen where a form lay last.
 
         Skin may be like it in another light: on average it has to be like it in this one.
@@ -264,6 +264,8 @@ class PieceFinder:
         if (pose := self._last.get(shape.form.id)) is None:
             return False
         places = shape.inside @ _turning(pose[2]) + pose[:2]
+        if self._sampled(covered, places).any():
+            return False
         seen, lights = (self._sampled(each, places).mean(0) for each in (flat, around))
         expected = np.minimum(lights * np.array(self._palette[TABLE]), 255)
         return bool((np.abs(seen - expected) < BARE * expected + NOISE / 2).all())

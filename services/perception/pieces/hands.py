@@ -65,12 +65,13 @@ class HandFinder:
         found, covered = [], np.zeros(changed.shape, np.uint8)
         for number in range(1, count):
             own = numbers == number
-            if boxes[number, cv2.CC_STAT_AREA] * self._step**2 < SMALLEST or not (own & self._rim).any():
+            if not (own & self._rim).any():
                 continue
-            hand = self._hand(own)
-            if math.dist((hand.x, hand.y), (hand.from_x, hand.from_y)) >= REACHES:
-                found.append(hand)
-                covered |= own.astype(np.uint8)
+            covered |= own.astype(np.uint8)  # also what only begins to come in: else it would become the table
+            if boxes[number, cv2.CC_STAT_AREA] * self._step**2 >= SMALLEST:
+                hand = self._hand(own)
+                if math.dist((hand.x, hand.y), (hand.from_x, hand.from_y)) >= REACHES:
+                    found.append(hand)
         free = cv2.dilate(covered, np.ones((5, 5), np.uint8)) == 0
         self._before[free] = now[free]
         return found, cv2.resize(covered, shares.shape[1::-1], interpolation=cv2.INTER_NEAREST)

@@ -42,6 +42,8 @@ STILL = 0.03
 REACH: Meters = 0.15
 SWIFT = 1.5
 """Distance, and more for each second, at which a hand is the same from one picture to the next."""
+HELD: Meters = 0.12
+"""Distance from the middle of a hand within which a piece goes with it: then one picture is enough."""
 COVERED: Probability = 0.3
 """Confidence in where a piece lies that is not seen."""
 PATIENCE: Seconds = 0.4
@@ -77,7 +79,7 @@ class PieceKeeper:
         seen = {piece.id: piece for piece in spotted.pieces}
         for id, kept in self._kept.items():
             if id in seen:
-                _see(kept, _turned_alike(kept, seen[id]), at)
+                _see(kept, _turned_alike(kept, seen[id]), at, spotted.hands)
             else:
                 _miss(kept, at, is_bare=id in spotted.bare)
         return tuple(self._entities())
@@ -142,7 +144,7 @@ def _turned_alike(kept: _Kept, piece: SpottedPiece) -> SpottedPiece:
     return _with(piece, yaw=about + math.remainder(piece.yaw - about, math.tau / kept.form.turns_alike))
 
 
-def _see(kept: _Kept, piece: SpottedPiece, at: Seconds) -> None:
+def _see(kept: _Kept, piece: SpottedPiece, at: Seconds, hands: Iterable[SpottedHand]) -> None:
     kept.seen, kept.bare = at, None
     kept.is_covered = False
     before, kept.elsewhere = kept.elsewhere, None
@@ -157,6 +159,11 @@ def _see(kept: _Kept, piece: SpottedPiece, at: Seconds) -> None:
         kept.pose = _settled(kept.pose, [each for _, each in kept.rests], piece.seen)
         return
     kept.elsewhere = (at, piece)
+    is_held = any(math.dist((hand.x, hand.y), (piece.x, piece.y)) < HELD for hand in hands)
+    if before is None and is_held and kept.pose is not None:
+        kept.pose, kept.velocity = piece, (0.0, 0.0)  # told late, it would not have gone with the hand
+        kept.rests.clear()
+        return
     if before is None:
         return  # a picture alone may err
     since, last = before

@@ -4,10 +4,13 @@ import math
 
 import pytest
 
-from engage_hri.schemas.world import Entity
-from engage_hri.services.perception.pieces.keeping import HandKeeper
-from engage_hri.services.perception.pieces.spotting import SpottedHand
-from tests.perception.pieces.tables import SKINS, STARTS, TABLE, Hand, Light, drawn
+from engage_hri.schemas.units import Stamp
+from engage_hri.schemas.world import Entity, World
+from engage_hri.services.perception.pieces.keeping import HandKeeper, PieceKeeper
+from engage_hri.services.perception.pieces.spotting import SpottedHand, SpottedPieces
+from engage_hri.services.recognition.config import RecognitionConfig
+from engage_hri.services.recognition.perceive.manipulation import Manipulation
+from tests.perception.pieces.tables import SKINS, STARTS, TABLE, Hand, Light, Pose, drawn
 from tests.perception.pieces.test_finding import finder
 
 AHEAD = Hand((0.62, 0.12))
@@ -83,3 +86,26 @@ def test_the_arm_of_the_robot_itself_is_not_told_and_that_of_nobody_has_no_owner
     assert keeper.feed([spotted(0.5, 0.0, (0.27, 0.1))], (ANN,), 0.0) == ()
     [hand] = keeper.feed([spotted(0.8, 0.0, (0.98, 0.1))], (), 0.5)
     assert (hand.id, hand.owner) == ("hand", "")
+
+
+def test_a_piece_that_is_carried_before_a_slow_camera_is_an_act_of_who_carries_it():
+    """Two pictures a second: the hand comes, has laid the piece 25 cm away by the next picture, and goes."""
+    looks, pieces, hands = finder(), PieceKeeper(TABLE), HandKeeper(TABLE)
+    manipulation, (x, y, _) = Manipulation("robot", RecognitionConfig()), STARTS["blue-square"]
+    there = {**STARTS, "blue-square": (0.62, 0.02, 0.3)}
+    film: list[tuple[dict[str, Pose], tuple[float, float] | None]] = [
+        (STARTS, None), (STARTS, None), (STARTS, (x + 0.3, y)), (STARTS, (x + 0.1, y)), (there, (0.72, 0.02)),
+        (there, (0.9, -0.1)), (there, None), (there, None),
+    ]  # fmt: skip
+    told = []
+    for number, (poses, at) in enumerate(film):
+        now = number / 2
+        seen = looks.find(drawn(poses, hands=[Hand(at)] if at else [], seed=1, take=number))
+        spotted = SpottedPieces(at=Stamp("", now), **seen._asdict())
+        entities = (ANN, *pieces.feed(spotted, now), *hands.feed(spotted.hands, (ANN,), now))
+        told += manipulation.feed(World(entities=entities), now)
+
+    assert [each.actor for each in told] == ["ann", "ann"]
+    assert [(change.began, change.action, change.targets) for each in told for change in each.changes] == [
+        (True, "act", ("blue-square",)), (False, "act", ("blue-square",))
+    ]  # fmt: skip
