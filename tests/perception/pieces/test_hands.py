@@ -92,10 +92,10 @@ def test_a_piece_that_is_carried_before_a_slow_camera_is_an_act_of_who_carries_i
     """Two pictures a second: the hand comes, has laid the piece 25 cm away by the next picture, and goes."""
     looks, pieces, hands = finder(), PieceKeeper(TABLE), HandKeeper(TABLE)
     manipulation, (x, y, _) = Manipulation("robot", RecognitionConfig()), STARTS["blue-square"]
-    there = {**STARTS, "blue-square": (0.62, 0.02, 0.3)}
+    there = {**STARTS, "blue-square": (0.74, 0.0, 0.3)}
     film: list[tuple[dict[str, Pose], tuple[float, float] | None]] = [
-        (STARTS, None), (STARTS, None), (STARTS, (x + 0.3, y)), (STARTS, (x + 0.1, y)), (there, (0.72, 0.02)),
-        (there, (0.9, -0.1)), (there, None), (there, None),
+        (STARTS, None), (STARTS, None), (STARTS, (x + 0.3, y)), (STARTS, (x + 0.1, y)), (there, (0.84, 0.0)),
+        (there, (0.95, -0.1)), (there, None), (there, None),
     ]  # fmt: skip
     told = []
     for number, (poses, at) in enumerate(film):
