@@ -1,4 +1,4 @@
-"""Whose voice it is, of several people: that of whom the lips move with it. Pure.
+"""Lips of several people, and of whom a voice is: of the one whose lips move with it. Pure.
 
     lips = Lips()
     lips.hear(samples, at)              # sound in which one of them may speak, as it comes
@@ -70,7 +70,7 @@ class Lips:
         return who if most >= max(OPENS, CLEAR * rest) else ""
 
     def _opens(self, mouths: deque[tuple[Seconds, Probability]], since: Seconds, until: Seconds) -> float:
-        """How far a mouth opens and closes with the loudness: the deviation of its changes that goes with theirs."""
+        """Measure how far a mouth opens and closes with the loudness: by the deviation that the two have in common."""
         first, last = SOUND
         times, levels = (
             (np.array(each) for each in zip(*self._loud, strict=True)) if self._loud else (np.zeros(0),) * 2

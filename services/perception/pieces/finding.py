@@ -95,7 +95,7 @@ class _Laid(NamedTuple):
 
 
 class FoundOnTable(NamedTuple):
-    """What is found in a picture. bare: ids of pieces where the bare table is seen now that were seen before."""
+    """Pieces and hands in a picture. bare: ids of pieces where the bare table is seen now that were seen before."""
 
     pieces: tuple[SpottedPiece, ...]
     bare: tuple[str, ...]
@@ -317,7 +317,7 @@ class PieceFinder:
         return max(rivals, key=lambda laid: self._agreement(seen, shape, laid.pose), default=best)
 
     def _agreement(self, seen: _Seen, shape: _Shape, pose: Floats) -> float:
-        """How well a form there explains all tops around, as a share of it: what it covers less what it leaves."""
+        """Judge how well a form there explains all tops around: what it covers less what it leaves, as a share."""
         top = self._flat.at(shape.outline @ _turning(pose[2]) + pose[:2])[:, ::-1]
         low = np.floor(top.min(0) - MARGIN / STEP).astype(int).clip(0)
         high = np.ceil(top.max(0) + MARGIN / STEP).astype(int)

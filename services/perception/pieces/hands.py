@@ -77,7 +77,7 @@ class HandFinder:
         return found, cv2.resize(covered, shares.shape[1::-1], interpolation=cv2.INTER_NEAREST)
 
     def _changed(self, now: Any, is_seen: Any) -> Any:
-        """Where something is on the table that was not there before, and is no shadow."""
+        """Find where something is on the table that was not there before, and is no shadow."""
         ratio = now / np.maximum(self._before, 0.05)
         away = np.abs(now - self._before) / np.maximum(np.maximum(now, self._before), 0.05)
         most = away.max(2)

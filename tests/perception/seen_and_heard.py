@@ -1,6 +1,6 @@
 """Appendix B from rendered film and spoken sound alone, beside the same person told exactly: their connection events.
 
-python benchmarks/seen_and_heard.py [--seed 0] [--looks 0]     (`make eyes` fetches what it needs; ten minutes)
+python -m tests.perception.seen_and_heard [--seed 0] [--looks 0]     (`make eyes` fetches what it needs; ten minutes)
 
 --looks: number of the person, of those of whom nothing is learned. docs/eyes.md has the differences.
 """
@@ -24,7 +24,7 @@ from engage_hri.services.runtime.virtual_time import run_virtual
 from engage_hri.services.tangram.people import service as simulation
 from tests.perception.eyes.film_of_looks import EYES
 from tests.perception.pieces.tables import EYE
-from tests.scenario.filmed_room import (
+from tests.perception.filmed_room import (
     WORDS,
     FilmedRoom,
     FilmingFaces,
