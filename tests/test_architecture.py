@@ -64,7 +64,8 @@ LAYERS = {
     "services/perception": "testing > pieces > eyes hearing > attached child offered pictures",
     "services/perception/eyes": "service > pages > people seat > watching > sources > placing seeing"
     " > nodding tracking > camera head_pose one_euro > looking > config",
-    "services/perception/pieces": "service > watching > keeping sources > finding > hands > spotting > colors > config",
+    "services/perception/pieces": "service > watching > keeping sources > finding > hands > spotting"
+    " > colors > config",
     "services/perception/hearing": "service > device pages > intake > speeches"
     " > company listening microphone own_voice recognizers > lips recognizing sound > voice > config",
     "services/commandline": "look robot study talk > app bodies embedding > shell",

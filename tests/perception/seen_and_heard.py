@@ -23,7 +23,6 @@ from engage_hri.services.runtime.service import Service
 from engage_hri.services.runtime.virtual_time import run_virtual
 from engage_hri.services.tangram.people import service as simulation
 from tests.perception.eyes.film_of_looks import EYES
-from tests.perception.pieces.tables import EYE
 from tests.perception.filmed_room import (
     WORDS,
     FilmedRoom,
@@ -33,6 +32,7 @@ from tests.perception.filmed_room import (
     colors,
     microphone,
 )
+from tests.perception.pieces.tables import EYE
 from tests.scenario.playing import Record, play
 from tests.scenario.test_appendix_b import EXPECTED, by_step
 

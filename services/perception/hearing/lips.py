@@ -70,7 +70,7 @@ class Lips:
         return who if most >= max(OPENS, CLEAR * rest) else ""
 
     def _opens(self, mouths: deque[tuple[Seconds, Probability]], since: Seconds, until: Seconds) -> float:
-        """Measure how far a mouth opens and closes with the loudness: by the deviation that the two have in common."""
+        """Measure how far a mouth opens and closes with the loudness: by what both have in common."""
         first, last = SOUND
         times, levels = (
             (np.array(each) for each in zip(*self._loud, strict=True)) if self._loud else (np.zeros(0),) * 2
