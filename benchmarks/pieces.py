@@ -61,15 +61,15 @@ def judged(number: int) -> Judged:
         float(rng.normal(0, 0.4)),
         int(rng.integers(4)),
     )
-    hands = [None, None, hand, hand, hand] if condition.startswith("a hand") else [None, None]
+    hands = [(), (), (hand,), (hand,), (hand,)] if condition.startswith("a hand") else [(), ()]
     finder, keeper, spent = PieceFinder(TABLE, flat, palette), PieceKeeper(TABLE), list[float]()
     told: tuple[Entity, ...] = ()
     for k, each in enumerate(hands):
         picture = drawn(truth, EYE, light, each, seed=number, take=k)
         begin = time.process_time()
-        pieces, bare = finder.find(picture)
+        seen = finder.find(picture)
         spent.append(1000 * (time.process_time() - begin))
-        spotted = SpottedPieces(at=Stamp("", k / RATE), pieces=tuple(pieces), bare=tuple(bare))
+        spotted = SpottedPieces(at=Stamp("", k / RATE), **seen._asdict())
         told = keeper.feed(spotted, k / RATE)
     poses = poses_told(told)
     expected, found = relations(truth), relations(poses)

@@ -68,9 +68,10 @@ LAYERS = {
     "services/perception": "testing > pieces > eyes hearing > attached child offered pictures",
     "services/perception/eyes": "service > pages > people seat > watching > sources > placing seeing"
     " > nodding tracking > camera head_pose one_euro > looking > config",
-    "services/perception/pieces": "service > watching > keeping sources > finding > spotting > colors > config",
+    "services/perception/pieces": "service > watching > keeping sources > finding > hands > spotting"
+    " > colors > config",
     "services/perception/hearing": "service > device pages > intake > speeches"
-    " > company listening microphone own_voice recognizers > recognizing sound > voice > config",
+    " > company listening microphone own_voice recognizers > lips recognizing sound > voice > config",
     "services/commandline": "look robot study talk > app bodies embedding > shell",
     "services/client": "conversation > language_models > robot > heard turn > known_objects outcomes > performing"
     " > orders > feeds people > chunking event_stream inputs turn_ends",

@@ -36,11 +36,12 @@ OWN_BLOCKS = ("maintenance-", "response-")
 
 
 class Doing(Struct, frozen=True):
-    """An action under way. targets: entity ids; empty with `look`: away."""
+    """An action under way. targets: entity ids; empty with `look`: away. one_of: it is at one of them."""
 
     action: Action
     targets: tuple[str, ...]
     since: Seconds
+    one_of: bool = False
 
 
 class Actor(Struct, frozen=True, kw_only=True):
@@ -183,12 +184,12 @@ def _warned(warning: WarningFeedback) -> Warned:
 def _act(scene: Scene, message: ActionBegan | ActionEnded | ActorFound | ActorLost, at: Seconds) -> Scene:
     actor = scene.actor(message.actor)
     match message:
-        case ActionBegan(action=action, targets=targets):
+        case ActionBegan(action=action, targets=targets, one_of=one_of):
             # A new look ends the last one.
             others = tuple(
                 d for d in actor.doing if d.action != action or (action != "look" and d.targets != targets)
             )
-            actor = Actor(id=actor.id, doing=(*others, Doing(action, targets, at)))
+            actor = Actor(id=actor.id, doing=(*others, Doing(action, targets, at, one_of)))
         case ActionEnded(action=action, targets=targets):
             kept = [d for d in actor.doing if (d.action, d.targets) != (action, targets)]
             actor = Actor(id=actor.id, doing=tuple(kept))

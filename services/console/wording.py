@@ -47,15 +47,22 @@ def clock(value: Seconds) -> str:
     return f"{int(minutes)}:{rest:04.1f}"
 
 
-def action_words(action: of.Action, targets: Sequence[str], robot: str) -> tuple[str, str]:
-    """Words for an action and its targets: `looks`, `at the robot`.
+def together(names: Sequence[str], *, one_of: bool) -> str:
+    """Names of several things: `blue-square and rectangle`; where it is one of them, `blue-square or rectangle`."""
+    *first, last = names
+    return f"{', '.join(first)} {'or' if one_of else 'and'} {last}" if first else last
+
+
+def action_words(action: of.Action, targets: Sequence[str], robot: str, *, one_of: bool = False) -> tuple[str, str]:
+    """Words for an action and its targets: `looks`, `at the robot`. one_of: it is at one of these.
 
     A look without targets is a look away; other actions without targets have no words for them.
     """
     verb, preposition = of.ACTIONS[action]
     if not targets:
         return verb, "away" if action == "look" else ""
-    return verb, preposition + " and ".join("the robot" if target == robot else target for target in targets)
+    names = ["the robot" if target == robot else target for target in targets]
+    return verb, preposition + together(names, one_of=one_of)
 
 
 def decision(event: ConnectionEvent) -> str:

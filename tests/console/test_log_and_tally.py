@@ -9,6 +9,7 @@ from engage_hri.schemas.blocks import BodyHeld, Held, Hold, WarningFeedback
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.recognition import Floor, FloorSpeech, Interjection, Statistics, WindowStatistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console import view
@@ -36,6 +37,16 @@ def test_the_log_tells_the_scene_in_order() -> None:
         "0:01.0  * directed gaze, robot → human about rectangle (reference): waiting",
         "0:01.9  * directed gaze, robot → human about rectangle (reference): succeeded 0.90 s",
         '0:02.0  robot: "a rectangle" (from 0:00.6)',
+    ]
+
+
+def test_what_cannot_be_told_apart_is_told_as_one_or_the_other() -> None:
+    look = ActionBegan(actor="ann", action="look", targets=("a", "b", "c"), one_of=True, at=at(0.0))
+    directed = event("e", "started", 10.5, objects=("a", "b"), one_of=True)
+
+    assert lines(((look, 10.0), directed), Telling()) == [
+        "0:00.0  ann looks at a, b or c",
+        "0:00.5  * directed gaze, robot → human about a or b (reference): waiting",
     ]
 
 

@@ -46,7 +46,7 @@ def test_who_speaks_now_is_a_voice_with_those_it_is_for() -> None:
 def test_a_bond_is_there_while_its_event_goes_on_and_is_met_once_it_succeeded() -> None:
     values: dict[str, Any] = {
         "kind": "directed_gaze", "by": "robot", "to": "ann", "about": ("cup",), "cause": "reference",
-        "optional": False, "delay": None, "limit": None, "since": 1.0, "decided": None,
+        "optional": False, "delay": None, "limit": None, "since": 1.0, "decided": None, "one_of": False,
     }  # fmt: skip
     waits = sections.EventShown(id="a", state="started", until=None, **values)
     met = sections.EventShown(id="b", state="succeeded", until=None, **values)

@@ -1,6 +1,7 @@
 """Play the whole system in virtual time and keep what happened."""
 
 import asyncio
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -79,11 +80,12 @@ async def play(
     habits: Habits | None = None,
     sensors: SimulationConfig | None = None,
     control: ControlConfig | None = None,
+    people: Mapping[str, Service] | None = None,
     **manager: Any,
 ) -> Record:
     """Until the manager has said goodbye. faults: of the bus. noise: of the body. habits: of the stochastic person.
     sensors: how person and table are perceived; exactly, by default. control: in place of the torso with `noise`.
-    manager: its configuration.
+    people: services in the place of the simulated person. manager: its configuration.
     """
     received: list[Received] = []
     finished = asyncio.Event()
@@ -98,7 +100,7 @@ async def play(
         "realizer": partial(realize, config=RealizerConfig()),
         "recognition": partial(recognize, config=RecognitionConfig(gaze_resolution=resolution)),  # type: ignore[arg-type]
         "generation": partial(generate, config=GenerationConfig(condition=condition)),
-        "simulation": partial(simulate, config=person, habits=habits or Habits()),
+        **(people or {"simulation": partial(simulate, config=person, habits=habits or Habits())}),
         "collaboration": collaboration,
     }
     async with MemoryHub() if faults is None else FaultyHub(faults, seed) as hub:

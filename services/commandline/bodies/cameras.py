@@ -164,7 +164,7 @@ def learned_colors(options: CameraOptions) -> int:
     camera = StatedCamera(config.field_of_view, config.place, config.tilt, config.pan, config.roll)
     flat = FlatTable(table, camera, image.shape[1], image.shape[0])
     palette = learned(image, table, flat)
-    found, _ = PieceFinder(table, flat, palette).find(image)
+    found = PieceFinder(table, flat, palette).find(image).pieces
     there = {piece.id: (piece.x, piece.y) for piece in found}
     astray = [
         form.id for form in table.pieces if dist(there.get(form.id, (9, 9)), (form.start.x, form.start.y)) > ASTRAY

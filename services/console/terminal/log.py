@@ -56,7 +56,8 @@ def _text(message: Message, before: Scene, after: Scene, at: Seconds, telling: T
             planned = "" if message.predicted is None else f" (planned {wording.seconds(message.predicted)})"
             return f"{block}:{message.behavior}:{message.sync} at {wording.seconds(message.time)}{planned}"
         case ConnectionEvent(state=state) if state != "completed" and not message.retold:
-            about = f" about {', '.join(message.objects)}" if message.objects else ""
+            objects = message.objects
+            about = f" about {wording.together(objects, one_of=message.one_of)}" if objects else ""
             kind, decided = EVENT_KINDS[message.kind].title, wording.decision(message)
             return f"* {kind}, {message.initiator} → {message.responder}{about} ({message.cause}): {decided}"
         case Interjection():
@@ -124,6 +125,7 @@ def _action(message: ActionBegan | ActionEnded | ActorFound | ActorLost, before:
                     return f'{actor}: "{said.text}" (from {wording.clock(said.began - before.began)})'
         case ActionBegan(action="speak") if actor == before.robot:
             return None
-        case ActionBegan(action=action, targets=targets):
-            return " ".join((actor, *filter(None, wording.action_words(action, targets, before.robot))))
+        case ActionBegan(action=action, targets=targets, one_of=one_of):
+            words = wording.action_words(action, targets, before.robot, one_of=one_of)
+            return " ".join((actor, *filter(None, words)))
     return None

@@ -94,7 +94,7 @@ def _doing(scene: Scene, actor: Actor) -> Text:
     for action in sorted(actor.doing, key=lambda doing: doing.action != "look"):
         if doing:
             doing += Text(", ")
-        verb, target = wording.action_words(action.action, action.targets, scene.robot)
+        verb, target = wording.action_words(action.action, action.targets, scene.robot, one_of=action.one_of)
         doing += Text(verb) + Text(printable(f" {target}") if target else "", style="bold")
     return doing
 
@@ -150,7 +150,7 @@ def _event(row: EventInView, scene: Scene) -> tuple[RenderableType, ...]:
         Text(wording.clock(row.began - scene.began), style="dim"),
         Text(EVENT_KINDS[event.kind].title, style="bold" if event.state == "started" else ""),
         Text(printable(f"{event.initiator}→{event.responder}")),
-        Text(printable(", ".join(event.objects))),
+        Text(printable(wording.together(event.objects, one_of=event.one_of) if event.objects else "")),
         Text(event.cause, style="dim"),
         Text(wording.decision(event), style=style),
     )

@@ -73,8 +73,9 @@ class _Event:
         event = self.event
         return sections.EventShown(
             id=event.id, kind=event.kind, by=event.initiator, to=event.responder, about=event.objects,
-            cause=event.cause, state=self.decision, optional=event.optional, delay=self.delay, limit=event.limit,
-            since=zero(self.since), decided=_or_none(zero, self.decided), until=_or_none(zero, self.until),
+            one_of=event.one_of, cause=event.cause, state=self.decision, optional=event.optional, delay=self.delay,
+            limit=event.limit, since=zero(self.since), decided=_or_none(zero, self.decided),
+            until=_or_none(zero, self.until),
         )  # fmt: skip
 
 

@@ -64,6 +64,7 @@ def _person(actor: Actor, at: Vector | None) -> sections.PersonShown:
     return sections.PersonShown(
         id=actor.id, at=None if at is None else _place(at), present=actor.present,
         looks=actor.look.targets if actor.look is not None else None,
+        one_of=actor.look is not None and actor.look.one_of,
         points=targets("point"), acts=targets("act") or (("",) if "act" in doing else ()),
         nods="nod" if "nod" in doing else "shake" if "shake" in doing else "", speaks="speak" in doing,
     )  # fmt: skip

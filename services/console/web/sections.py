@@ -35,13 +35,15 @@ class Thing(Struct, frozen=True):
 class PersonShown(Struct, frozen=True):
     """A person. at: the face; None: the world does not say where.
 
-    looks: ids of what they look at; empty: away; None: nobody says. points, acts: ids. present: False: gone.
+    looks: ids of what they look at; empty: away; None: nobody says. one_of: it is one of these. points, acts: ids.
+    present: False: gone.
     """
 
     id: str
     at: Vector | None
     present: bool
     looks: tuple[str, ...] | None
+    one_of: bool
     points: tuple[str, ...]
     acts: tuple[str, ...]
     nods: str
@@ -149,6 +151,7 @@ class EventShown(Struct, frozen=True):
     by: str
     to: str
     about: tuple[str, ...]
+    one_of: bool
     cause: str
     state: EventState
     optional: bool

@@ -5,6 +5,7 @@ device.py        ears at a device or a file
 pages.py         ears at the microphones of pages
 intake.py        what it takes from the bus besides sound
 speeches.py      what is said in channels of sound: by whom, since when, with which words
+lips.py          whose voice it is of several people; pure
 company.py       who is here, and what hearing complains of
 voice.py         when a voice begins and ends in sound; pure
 sound.py         samples: WAV files, rates, and when each was captured; pure

@@ -20,9 +20,9 @@ async def hear(bus: Bus, ready: Ready, config: HearingConfig) -> None:
     Raises InputRefused: there is no such sound or recognizer, or a package is not installed.
     """
     has_pages = config.source == PAGE
-    sound = (keys.ANY_SOUND,) if has_pages else ()
+    more = (keys.ANY_SOUND,) if has_pages else () if config.people else (keys.ANY_HEAD_POSE,)
     own = (keys.ROBOT_SOUND,) if is_cancelling(config) else ()
-    with bus.subscribe(keys.ANY_ROBOT_ALIVE, keys.WORLD, keys.ROBOT_ACTION, *sound, *own) as inbox:
+    with bus.subscribe(keys.ANY_ROBOT_ALIVE, keys.WORLD, keys.ROBOT_ACTION, *more, *own) as inbox:
         tell_settings(bus, "hearing", config)
         people, faults = HeardPeople(bus), HearingFaults(bus)
         speeches = Speeches(bus, config, people, faults)

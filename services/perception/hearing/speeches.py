@@ -2,6 +2,9 @@
 
 A voice is told as the action `speak` of a person, with the instants at which it was to be heard, which lie some time
 back when they are known. Where a recognizer is at work, an utterance without words comes first: words will follow.
+
+In a channel that is nobody's own, among several people, it is told at once as that of `voice_1`; when lips show whose
+it is, that they are the same (`ActorFound.same_as`), and once more if they show otherwise later.
 """
 
 import asyncio
@@ -15,12 +18,21 @@ from msgspec.structs import replace
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import LONGEST_TEXT, ActionBegan, ActionEnded, Utterance
+from engage_hri.schemas.perception import (
+    LONGEST_TEXT,
+    ActionBegan,
+    ActionEnded,
+    ActorFound,
+    ActorLost,
+    HeadPose,
+    Utterance,
+)
 from engage_hri.schemas.sound import SoundFrame
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.perception.hearing.company import HeardPeople, HearingFaults
 from engage_hri.services.perception.hearing.config import HearingConfig
+from engage_hri.services.perception.hearing.lips import Lips
 from engage_hri.services.perception.hearing.listening import InItsOwn, InThisProcess, Order, Understanding
 from engage_hri.services.perception.hearing.microphone import is_file
 from engage_hri.services.perception.hearing.own_voice import VAIN, Canceller, CautiousJudge, OwnVoice
@@ -38,6 +50,10 @@ from engage_hri.services.runtime.installation import extra_command
 
 VISITOR = "visitor"
 """Id of the person who speaks where nobody tells of any."""
+STRANGER = "voice"
+"""What an id begins with of which a number follows, of a voice of which it is not known whose it is."""
+LIPS_LATE: Seconds = 0.5
+"""Time after a voice within which pictures that were taken meanwhile are looked at."""
 BEFORE_SPEECH: Seconds = 1.0
 """Time before the robot speaks from which on sound of its voice is that of this speech."""
 ECHO: Seconds = 0.2
@@ -52,10 +68,15 @@ def is_cancelling(config: HearingConfig) -> bool:
 
 
 class _Speech:
-    """A speech that goes on, or whose words are awaited. number: for the recognizer."""
+    """A speech that goes on, or whose words are awaited. number: for the recognizer. since: loop time of its onset.
 
-    def __init__(self, number: int, utterance: Utterance) -> None:
-        self.number, self.utterance = number, utterance
+    until: loop time at which it had ended. whose: id of the person whose voice it is, as lips show.
+    """
+
+    def __init__(self, number: int, utterance: Utterance, since: Seconds) -> None:
+        self.number, self.utterance, self.since = number, utterance, since
+        self.until: Seconds | None = None
+        self.whose = ""
 
 
 class SoundChannel:
@@ -87,7 +108,10 @@ class Speeches:
         self._awaited: dict[int, _Speech] = {}
         """Speeches whose words are not known for good, by number."""
         self._all_known = asyncio.Event()
-        self._numbers = count(1)
+        self._numbers, self._strangers = count(1), count(1)
+        self._lips = Lips()
+        self._nobodys: list[_Speech] = []
+        """Speeches of which lips may still show whose they are."""
         self._robot_speaks = float("-inf"), float("-inf")
         """Since when the robot speaks, or has spoken last, and until when."""
         self.recognizer = self._understanding()
@@ -104,8 +128,11 @@ class Speeches:
         return SoundChannel(person, self._config.pause, self._own_voice)
 
     def take(self, message: Message) -> None:
-        """Take what is told of the robot's own voice."""
+        """Take what is told of the robot's own voice, and of people's lips."""
         match message:
+            case HeadPose(actor=actor, mouth=float() as mouth, at=at):
+                self._lips.see(actor, mouth, self._bus.local(at))
+                self._look_whose(self._bus.now())
             case ActionBegan(actor=self._bus.robot, action="speak", at=at):
                 self._robot_speaks = self._bus.local(at), float("inf")
             case ActionEnded(actor=self._bus.robot, action="speak", at=at):
@@ -124,6 +151,8 @@ class Speeches:
                 reason = "the robot's own voice cannot be taken out of the sound: nobody is heard while it speaks"
                 advice = "use a headset, or the page that plays it"
                 self._faults.tell_once(Fault(reason=reason, where="hearing", advice=advice))
+        if not channel.person:
+            self._lips.hear(samples, at)
         self._tell(channel, channel.ear.feed(samples, at))
 
     def lose(self, channel: SoundChannel) -> None:
@@ -162,10 +191,17 @@ class Speeches:
     def _began(self, channel: SoundChannel, at: Seconds) -> _Speech | None:
         if (person := self._speaker(channel)) is None:
             return None
-        self._people.bring(person, at)
+        if is_nobodys := person == STRANGER:
+            person = f"{STRANGER}_{next(self._strangers)}"
+            # Another life of this program may have had the id for somebody else.
+            self._people.perceived.tell(ActorFound(actor=person, at=self._bus.stamp(at), same_as=person))
+        else:
+            self._people.bring(person, at)
         number, stamp = next(self._numbers), self._bus.stamp(at)
         words = Utterance(actor=person, id=f"{self._bus.run}-{number}", text="", began=stamp, at=stamp, final=False)
-        speech = _Speech(number, words)
+        speech = _Speech(number, words, at)
+        if is_nobodys:
+            self._nobodys.append(speech)
         if self.recognizer is not None:
             self._awaited[number] = speech
             self._bus.publish(keys.UTTERANCE, words)  # first, so that whoever waits knows that words will come
@@ -173,23 +209,37 @@ class Speeches:
         return speech
 
     def _ended(self, speech: _Speech, at: Seconds) -> None:
-        stamp = self._bus.stamp(at)
+        stamp, speech.until = self._bus.stamp(at), at
         speech.utterance = replace(speech.utterance, ended=stamp)
         self._people.perceived.tell(ActionEnded(actor=speech.utterance.actor, action="speak", at=stamp))
         if self.recognizer is not None:
             self.recognizer.hear(speech.number, b"")
 
     def _speaker(self, channel: SoundChannel) -> str | None:
-        """The person whose voice this is. None: there are several, and one channel cannot tell them apart."""
+        """The person whose voice this is; `STRANGER`: lips will show it. None: it cannot be told of several."""
         if channel.person:
             return channel.person
         here = self._people.here
+        if len(here) > 1 and self._lips.are_seen(self._bus.now()):
+            return STRANGER
         if len(here) > 1:
             reason = f"whose voice it is cannot be told: {', '.join(here)} are here, and there is one channel"
-            advice = "name one person for each channel"
+            advice = "name one person for each channel, or let eyes see their lips: engage run eyes"
             self._faults.tell_once(Fault(reason=reason, where="hearing.people", advice=advice))
             return None
         return here[0] if here else VISITOR
+
+    def _look_whose(self, now: Seconds) -> None:
+        """Tell of whom it is that they speak, as far as lips show it."""
+        for speech in [*self._nobodys]:
+            who, voice = self._lips.speaker(speech.since, speech.until or now), speech.utterance.actor
+            if who and who != speech.whose:
+                speech.whose = who
+                self._people.perceived.tell(ActorFound(actor=voice, at=self._bus.stamp(now), same_as=who))
+            if speech.until is not None and now > speech.until + LIPS_LATE and speech.number not in self._awaited:
+                self._nobodys.remove(speech)
+                if not speech.whose:
+                    self._people.perceived.tell(ActorLost(actor=voice, at=self._bus.stamp(now)))
 
     def _is_deaf(self, at: Seconds) -> bool:
         """True if the robot's voice may be heard at this time, and cannot be told from a person's."""

@@ -27,7 +27,8 @@ from engage_hri.services.perception.eyes.camera import StatedCamera
 from engage_hri.services.perception.eyes.looking import Floats
 from engage_hri.services.perception.pictures import Image
 from engage_hri.services.perception.pieces.colors import TABLE, Palette
-from engage_hri.services.perception.pieces.spotting import SpottedPiece
+from engage_hri.services.perception.pieces.hands import HandFinder
+from engage_hri.services.perception.pieces.spotting import SpottedHand, SpottedPiece
 
 Labels = NDArray[np.int8]
 STEP: Meters = 0.0015
@@ -70,9 +71,11 @@ LEAST_SEEN, MOST_FOREIGN, MOST_BEYOND = 0.35, 0.2, 0.45
 """Share of a form that must have its color, and may have another; of its surroundings that may have its color."""
 BARE = 0.06
 """Share by which the place of a piece that is away may differ from the color of the table."""
-LEAST, SAME, CERTAIN = 1.0, 1.3, 1.75
-"""Score of what is a piece at all; of one that is where it was, so that it is not looked for; of one that is so well
-found that no other place is tried. At most it is 2."""
+LEAST, SAME = 1.0, 1.3
+"""Score of what is a piece at all; and of one that is where it was, so that it is not looked for. At most it is 2."""
+RIVAL = 0.2
+"""Difference of scores up to which all pixels around decide: a trapezoid is nearly a triangle, and its walls can make
+up for its missing corner."""
 AGAIN = 10
 """Pictures after which a piece is looked for everywhere, whatever its score."""
 PLACE_KNOWN: Meters = 0.003
@@ -91,12 +94,24 @@ class _Laid(NamedTuple):
     turn_spread: float = math.inf
 
 
+class FoundOnTable(NamedTuple):
+    """Pieces and hands in a picture. bare: ids of pieces where the bare table is seen now that were seen before."""
+
+    pieces: tuple[SpottedPiece, ...]
+    bare: tuple[str, ...]
+    hands: tuple[SpottedHand, ...]
+
+
 class _Seen(NamedTuple):
-    """A picture, laid out flat. value: 1 where a color is, -1 where another one is. tops: the same, less on walls."""
+    """A picture, laid out flat. value: 1 where a color is, -1 where another one is. tops: the same, less on walls.
+
+    covered: 1 where a hand is.
+    """
 
     flat: Any
     value: Any
     tops: Any
+    covered: Any
 
 
 class FlatTable:
@@ -118,7 +133,7 @@ class FlatTable:
         inside = np.zeros((self.rows, self.columns), np.uint8)
         cv2.fillConvexPoly(inside, np.rint(self.at(corners)[:, ::-1]).astype(np.int32), 1)
         self.is_table = np.asarray(cv2.erode(inside, np.ones((5, 5), np.uint8)), np.uint8)  # its edge is of no color
-        self.eye = np.array(eye[:2], float)
+        self.eye, self.height = np.array(eye[:2], float), eye[2] - top
         self.sunk = (eye[2] - top) / (eye[2] - z)
         """Scale about the eye that brings an outline on the table to where the plane of the tops shows it."""
 
@@ -216,27 +231,32 @@ class PieceFinder:
         self._flat, self._palette = flat, palette
         self._names = [*palette]
         self._shapes = [_Shape(form) for form in table.pieces]
+        self._hands = HandFinder(flat.is_table, flat.low, STEP, flat.eye, flat.height)
         self._last: dict[str, Floats] = {}
         """Pose in which each was seen last."""
         self._count = 0
 
-    def find(self, image: Image) -> tuple[list[SpottedPiece], list[str]]:
-        """Find the pieces in the next picture. Returns also the ids of those where the bare table is seen now."""
+    def find(self, image: Image) -> FoundOnTable:
+        """Find the pieces in the next picture, and the hands."""
         flat = self._flat.laid_out(image)
         around = light(flat, self._palette[TABLE])
         labels = labeled(flat, around, self._palette)
+        bare_table = np.maximum(around * np.array(self._palette[TABLE], np.float32), 1)
+        hands, covered = self._hands.find(flat / bare_table, (flat.max(2) > 0).astype(np.float32))
+        covered[(labels != UNKNOWN) & (labels != self._names.index(TABLE))] = 0  # a piece that it holds
+        labels[covered > 0] = UNKNOWN
         found = []
         for color in {shape.form.color: None for shape in self._shapes}:
             shapes = [shape for shape in self._shapes if shape.form.color == color]
-            found += self._of_color(flat, labels, self._names.index(color), shapes)
+            found += self._of_color(flat, labels, covered, self._names.index(color), shapes)
         ids = {piece.id for piece in found}
         away = [shape for shape in self._shapes if shape.form.id not in ids]
-        bare = [shape.form.id for shape in away if self._is_bare(flat, around, shape)]
+        bare = [shape.form.id for shape in away if self._is_bare(flat, around, covered, shape)]
         self._last |= {piece.id: np.array([piece.x, piece.y, piece.yaw]) for piece in found}
         self._count += 1
-        return found, bare
+        return FoundOnTable(tuple(found), tuple(bare), tuple(hands))
 
-    def _is_bare(self, flat: Any, around: Any, shape: _Shape) -> bool:
+    def _is_bare(self, flat: Any, around: Any, covered: Any, shape: _Shape) -> bool:
         """Tell whether the table is seen where a form lay last.
 
         Skin may be like it in another light: on average it has to be like it in this one.
@@ -244,15 +264,19 @@ class PieceFinder:
         if (pose := self._last.get(shape.form.id)) is None:
             return False
         places = shape.inside @ _turning(pose[2]) + pose[:2]
+        if self._sampled(covered, places).any():
+            return False
         seen, lights = (self._sampled(each, places).mean(0) for each in (flat, around))
         expected = np.minimum(lights * np.array(self._palette[TABLE]), 255)
         return bool((np.abs(seen - expected) < BARE * expected + NOISE / 2).all())
 
-    def _of_color(self, flat: Any, labels: Labels, number: int, shapes: Iterable[_Shape]) -> list[SpottedPiece]:
+    def _of_color(
+        self, flat: Any, labels: Labels, covered: Any, number: int, shapes: Iterable[_Shape]
+    ) -> list[SpottedPiece]:
         """Find the pieces of one color: the one that explains most first; what it explains is no other's."""
         value = np.where(labels == number, 1.0, np.where(labels == UNKNOWN, 0.0, -1.0)).astype(np.float32)
         tops = self._tops(flat, value)
-        seen, found = _Seen(flat, value, tops), []
+        seen, found = _Seen(flat, value, tops, covered), []
         looks_everywhere = (self._count + number) % AGAIN == 0
         waiting = {shape.form.id: shape for shape in shapes}
         best = {id: self._where_it_was(seen, shape) for id, shape in waiting.items()}
@@ -267,7 +291,7 @@ class PieceFinder:
             x, y, yaw = laid.pose.tolist()
             found.append(SpottedPiece(id, x, y, yaw, laid.seen, laid.spread, laid.turn_spread))
             self._take(value, shape, laid.pose)
-            seen = _Seen(flat, value, np.minimum(tops, value))
+            seen = seen._replace(tops=np.minimum(tops, value))
             best = {each: self._judged(seen, shape, best[each]) for each, shape in waiting.items()}
             looks_everywhere = False
         return found
@@ -281,15 +305,26 @@ class PieceFinder:
 
     def _anywhere(self, seen: _Seen, shape: _Shape) -> _Laid:
         """Lay a form where it explains its color best, of all places."""
-        best = _Laid(np.zeros(3), 0.0)
-        for pose in self._likely(seen.tops, shape):
-            best = max(best, self._moved(seen, shape, pose), key=lambda laid: laid.score)
-            if best.score > CERTAIN:
-                return best
+        tried = [
+            _Laid(np.zeros(3), 0.0),
+            *(self._moved(seen, shape, each) for each in self._likely(seen.tops, shape)),
+        ]
+        best = max(tried, key=lambda laid: laid.score)
         # One edge of a top and the foot of another wall may agree on a place beside the right one.
-        for beside in BESIDE if best.score > 0 else ():
-            best = max(best, self._moved(seen, shape, best.pose + beside), key=lambda laid: laid.score)
-        return best
+        tried += [self._moved(seen, shape, best.pose + beside) for beside in BESIDE if best.score > 0]
+        most = max(laid.score for laid in tried)
+        rivals = [laid for laid in tried if laid.score > max(0.0, most - RIVAL)]
+        return max(rivals, key=lambda laid: self._agreement(seen, shape, laid.pose), default=best)
+
+    def _agreement(self, seen: _Seen, shape: _Shape, pose: Floats) -> float:
+        """Judge how well a form there explains all tops around: what it covers less what it leaves, as a share."""
+        top = self._flat.at(shape.outline @ _turning(pose[2]) + pose[:2])[:, ::-1]
+        low = np.floor(top.min(0) - MARGIN / STEP).astype(int).clip(0)
+        high = np.ceil(top.max(0) + MARGIN / STEP).astype(int)
+        value = seen.tops[low[1] : high[1], low[0] : high[0]]
+        covers = np.zeros(value.shape, np.uint8)
+        cv2.fillConvexPoly(covers, np.rint(top - low - 0.5).astype(np.int32), 1)
+        return float((value * covers).sum() - ((value > 0.5) & (covers == 0)).sum()) / max(int(covers.sum()), 1)
 
     def _tops(self, flat: Any, value: Any) -> Any:
         """Values in which walls count less than tops: most of what is seen of a piece is its top, and walls are
@@ -392,6 +427,10 @@ class PieceFinder:
             rotation = _turning(pose[2])
             points, normals = shape.points @ rotation + pose[:2], shape.normals @ rotation
             away, weight = self._edges(seen.flat, points, normals)
+            # Where a hand is on either side, the edge may be that of the hand.
+            weight[
+                (self._sampled(seen.covered, points) > 0) | (self._sampled(seen.covered, points + SIDE * normals) > 0)
+            ] = 0
             weight = weight / (1 + (away / (TOLERANCE * (2 if round_ < ROUNDS / 2 else 1))) ** 2) ** 2
             arm = points - pose[:2]
             rows = np.column_stack([normals, normals[:, 1] * arm[:, 0] - normals[:, 0] * arm[:, 1]])

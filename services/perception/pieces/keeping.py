@@ -13,7 +13,7 @@ seen? Then somebody holds it, and it is left out; who remembers the world takes 
 
 import math
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from statistics import median
 
 from msgspec import Struct
@@ -23,7 +23,7 @@ from engage_hri.schemas.footprints import PiecePose
 from engage_hri.schemas.tables import Form, TaskTable
 from engage_hri.schemas.units import Meters, Probability, Radians, Seconds
 from engage_hri.schemas.world import Entity
-from engage_hri.services.perception.pieces.spotting import SpottedPiece, SpottedPieces
+from engage_hri.services.perception.pieces.spotting import HEIGHT, SpottedHand, SpottedPiece, SpottedPieces
 
 AWAY: Meters = 0.004
 """Distance, and turn, from which on a piece is elsewhere."""
@@ -39,6 +39,11 @@ FEWEST = 3
 """Pictures of a piece at rest from which on their median counts."""
 STILL = 0.03
 """Metres per second: a piece that is faster moves."""
+REACH: Meters = 0.15
+SWIFT = 1.5
+"""Distance, and more for each second, at which a hand is the same from one picture to the next."""
+HELD: Meters = 0.12
+"""Distance from the middle of a hand within which a piece goes with it: then one picture is enough."""
 COVERED: Probability = 0.3
 """Confidence in where a piece lies that is not seen."""
 PATIENCE: Seconds = 0.4
@@ -74,7 +79,7 @@ class PieceKeeper:
         seen = {piece.id: piece for piece in spotted.pieces}
         for id, kept in self._kept.items():
             if id in seen:
-                _see(kept, _turned_alike(kept, seen[id]), at)
+                _see(kept, _turned_alike(kept, seen[id]), at, spotted.hands)
             else:
                 _miss(kept, at, is_bare=id in spotted.bare)
         return tuple(self._entities())
@@ -88,13 +93,58 @@ class PieceKeeper:
                 yield replace(lying, confidence=confidence, velocity=(*kept.velocity, 0.0))
 
 
+class HandKeeper:
+    """The hands over a table: each is of the person who is nearest to where it comes over the edge.
+
+    One that comes from the side of the robot is its own, and is not told.
+    """
+
+    def __init__(self, table: TaskTable) -> None:
+        self._height = table.surface.center[2] + HEIGHT
+        self._half = math.hypot(*table.surface.center[:2])
+        self._hands: tuple[Entity, ...] = ()
+        self._at: Seconds = -math.inf
+
+    def feed(self, hands: Sequence[SpottedHand], people: Sequence[Entity], at: Seconds) -> tuple[Entity, ...]:
+        """Take the hands of a picture. Returns them as they are to be told."""
+        past, before = at - self._at, list(self._hands)
+        told: list[Entity] = []
+        for hand in hands:
+            comes = hand.from_x, hand.from_y
+            if math.hypot(*comes) < self._half:
+                continue
+            place = hand.x, hand.y, self._height
+            near = min(before, key=lambda each: math.dist(each.position, place), default=None)
+            if near is not None and math.dist(near.position, place) < REACH + SWIFT * past:
+                before.remove(near)
+                vx, vy, _ = ((b - a) / past for a, b in zip(near.position, place, strict=True))
+                told.append(replace(near, position=place, velocity=(vx, vy, 0.0)))
+            else:
+                owner = min(people, key=lambda each: math.dist(each.position[:2], comes), default=None)
+                told.append(Entity(id="", kind="hand", owner=owner.id if owner else "", position=place))
+        self._hands, self._at = tuple(_named(told)), at
+        return self._hands
+
+
+def _named(hands: Iterable[Entity]) -> Iterator[Entity]:
+    """Give those an id that have none: the first that nobody has."""
+    hands = [*hands]
+    taken = {each.id for each in hands}
+    for hand in hands:
+        name = f"{hand.owner}-hand" if hand.owner else "hand"
+        free = (id for id in (name, *(f"{name}-{k}" for k in range(2, 9))) if id not in taken)
+        named = hand if hand.id else replace(hand, id=next(free))
+        taken.add(named.id)
+        yield named
+
+
 def _turned_alike(kept: _Kept, piece: SpottedPiece) -> SpottedPiece:
     """The piece with the turn, of those that look the same, that is nearest to how it was told."""
     about = kept.pose.yaw if kept.pose is not None else math.radians(kept.form.start.yaw)
     return _with(piece, yaw=about + math.remainder(piece.yaw - about, math.tau / kept.form.turns_alike))
 
 
-def _see(kept: _Kept, piece: SpottedPiece, at: Seconds) -> None:
+def _see(kept: _Kept, piece: SpottedPiece, at: Seconds, hands: Iterable[SpottedHand]) -> None:
     kept.seen, kept.bare = at, None
     kept.is_covered = False
     before, kept.elsewhere = kept.elsewhere, None
@@ -109,6 +159,11 @@ def _see(kept: _Kept, piece: SpottedPiece, at: Seconds) -> None:
         kept.pose = _settled(kept.pose, [each for _, each in kept.rests], piece.seen)
         return
     kept.elsewhere = (at, piece)
+    is_held = any(math.dist((hand.x, hand.y), (piece.x, piece.y)) < HELD for hand in hands)
+    if before is None and is_held and kept.pose is not None:
+        kept.pose, kept.velocity = piece, (0.0, 0.0)  # told late, it would not have gone with the hand
+        kept.rests.clear()
+        return
     if before is None:
         return  # a picture alone may err
     since, last = before

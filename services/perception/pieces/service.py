@@ -22,7 +22,7 @@ from engage_hri.services.client.people.shared_world import SharedWorld
 from engage_hri.services.perception.eyes.watching import InsideWatching, OutsideWatching, SourceLost, SourceOrder
 from engage_hri.services.perception.pieces.colors import read_palette, task_table
 from engage_hri.services.perception.pieces.config import PiecesConfig
-from engage_hri.services.perception.pieces.keeping import COVERED, PieceKeeper
+from engage_hri.services.perception.pieces.keeping import COVERED, HandKeeper, PieceKeeper
 from engage_hri.services.perception.pieces.spotting import SpottedPieces, table_settings
 from engage_hri.services.perception.pieces.watching import TABLES_SEEN
 from engage_hri.services.runtime.service import Ready
@@ -71,7 +71,7 @@ class _Looking:
 
     def __init__(self, bus: Bus, table: TaskTable, inbox: Subscription) -> None:
         self._bus, self._inbox = bus, inbox
-        self._keeper, self._world = PieceKeeper(table), SharedWorld(bus.name)
+        self._keeper, self._hands, self._world = PieceKeeper(table), HandKeeper(table), SharedWorld(bus.name)
         top = table.surface
         self._top = Entity(id=top.id, kind="surface", position=top.center, footprint=top.footprint)
         self._own: tuple[Entity, ...] = ()
@@ -88,7 +88,8 @@ class _Looking:
         while (received := self._inbox.take()) is not None:
             is_due |= self._take(received)
         pieces = self._keeper.feed(spotted, spotted.at.seconds)
-        own = (self._top, *pieces)
+        people = [each for each in self._world.entities if each.kind == "person"]
+        own = (self._top, *pieces, *self._hands.feed(spotted.hands, people, spotted.at.seconds))
         if own != self._own or is_due:
             self._own = own
             self._show(spotted.at.seconds)

@@ -22,6 +22,9 @@ from engage_hri.services.perception.pictures import PictureSettings
 from engage_hri.services.perception.pieces.colors import Palette
 from engage_hri.services.perception.pieces.config import PiecesConfig
 
+HEIGHT: Meters = 0.04
+"""Height at which a hand over a table is taken to be: one picture does not tell."""
+
 
 class SpottedPiece(Struct, frozen=True):
     """A piece in a picture. seen: share of it that is in view. spread, turn_spread: standard deviations."""
@@ -35,13 +38,23 @@ class SpottedPiece(Struct, frozen=True):
     turn_spread: Radians = 0.01
 
 
+class SpottedHand(Struct, frozen=True):
+    """A hand over the table in a picture. x, y: its middle. from_x, from_y: where it comes over the edge."""
+
+    x: Meters
+    y: Meters
+    from_x: Meters
+    from_y: Meters
+
+
 class SpottedPieces(Struct, frozen=True, kw_only=True, tag=True):
-    """Pieces that are seen in a picture. at: when it was taken. bare: ids of those where the table is seen now that
-    were seen before. A piece that is neither here nor there is covered."""
+    """Pieces that are seen in a picture, and hands. at: when it was taken. bare: ids of those where the table is seen
+    now that were seen before. A piece that is neither here nor there is covered."""
 
     at: Stamp
     pieces: tuple[SpottedPiece, ...] = ()
     bare: tuple[str, ...] = ()
+    hands: tuple[SpottedHand, ...] = ()
 
 
 class TableSettings(PictureSettings, frozen=True, kw_only=True):

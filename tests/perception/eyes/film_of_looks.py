@@ -87,7 +87,7 @@ def filmed(number: int, looks: int) -> FilmedPerson:
     for name in [*("robot", pieces[0], pieces[1], "robot", pieces[2], pieces[3]), *rest]:
         choices = EMPTY if name == SURFACE else PAST
         place = ROBOT_FACE if name == "robot" else places.get(name) or choices[int(chance.integers(len(choices)))]
-        pose = _head(eyes, place, share, chance)
+        pose = head_at(eyes, place, share, stray(chance))
         way = (
             pose
             if not made
@@ -103,16 +103,21 @@ def filmed(number: int, looks: int) -> FilmedPerson:
     return FilmedPerson(number, eyes, made, light)
 
 
-def _head(eyes: Vector, place: Vector, share: tuple[float, float], chance: np.random.Generator) -> Pose:
+def stray(chance: np.random.Generator) -> Vector:
+    """By how many degrees the head of a look is beside its habit: to the side, up, and aslant."""
+    return (chance.normal(0, 1.5), chance.normal(0, 1.5), chance.uniform(-2, 2))
+
+
+def head_at(eyes: Vector, place: Vector, share: tuple[float, float], beside: Vector) -> Pose:
     """Turn a head towards a place, from the robot's face on by its share of the way; the eyes go the rest."""
     there, robot = (_angles(eyes, each) for each in (place, ROBOT_FACE))
     yaw, pitch = (
-        back + part * (to - back) + chance.normal(0, 1.5) for back, to, part in zip(robot, there, share, strict=True)
+        back + part * (to - back) + by for back, to, part, by in zip(robot, there, share, beside[:2], strict=True)
     )
     x, y, z = (a - b for a, b in zip(eyes, ROBOT_FACE, strict=True))
-    beside = (float(np.clip(there[0] - yaw, -30, 30)), float(np.clip(there[1] - pitch, -30, 30)))
-    lids = 1 - max(0.0, -beside[1]) / 50  # they follow the eyes down
-    return Pose((-y, -z, x), yaw, pitch, chance.uniform(-2, 2), beside, lids=lids)
+    rest = (float(np.clip(there[0] - yaw, -30, 30)), float(np.clip(there[1] - pitch, -30, 30)))
+    lids = 1 - max(0.0, -rest[1]) / 50  # they follow the eyes down
+    return Pose((-y, -z, x), yaw, pitch, beside[2], rest, lids=lids)
 
 
 def _angles(eyes: Vector, place: Vector) -> tuple[float, float]:

@@ -5,7 +5,7 @@ are wanted: the floor, the table with its grain, the shadows on it, the walls of
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import cv2
@@ -90,7 +90,7 @@ def drawn(
     poses: Mapping[str, Pose],
     eye: Eye = EYE,
     light: Light = EVEN,
-    hand: Hand | None = None,
+    hands: Sequence[Hand] = (),
     seed: int = 0,
     take: int = 0,
 ) -> Picture:
@@ -135,7 +135,7 @@ def drawn(
     albedo, grained, bright = shrunk(image), shrunk(wood)[..., None] / 255, light_on(lit, 1.5)
     streaks = cv2.resize(rng.normal(0, 0.035, (90, 12)).astype(np.float32), (eye.width, eye.height))[..., None]
     albedo *= 1 + streaks * grained
-    if hand is not None:
+    for hand in hands:
         dark, cover = np.full(size, 255, np.uint8), np.zeros(size, np.uint8)
         for part in _outlines(hand):
             fill(dark, on(TOP + THICK, part - sun[:2] / sun[2] * hand.above), 0)

@@ -1,5 +1,6 @@
 // Lanes over time: who speaks, connection events, and behaviors as planned and as measured. The present is near the right edge.
 import { clock, color, element, KINDS, seconds, sized } from "./look.js";
+import { list } from "./tell.js";
 
 const PAST = 26; // seconds in view
 const AHEAD = 5;
@@ -217,7 +218,7 @@ function drawEvent({ context, x, now, names }, event, top, size, shade, room) {
   } else {
     text = `waits ${(now - event.since).toFixed(1)} s`;
   }
-  const about = event.about.length ? `${event.about.join(", ")} ` : "";
+  const about = event.about.length ? `${list(event.about, event.one_of ? "or" : "and")} ` : "";
   context.fillStyle = color("--ink");
   const begins = Math.max(x(decided), names);
   caption(context, `${about}${text}`, begins, to + (event.state === "failed" ? 6 : 0), top + size / 2, room, GOOD.has(event.state));

@@ -192,7 +192,10 @@ function towards(from, to) {
 function drawPerson(layers, person, places, robot) {
   const target = person.looks?.length ? places.get(person.looks[0]) : null;
   const direction = target ? towards(person.at, target) : person.looks ? [-0.3, 0.95] : [-1, 0];
-  if (target) layers.lines.append(line(person.at, target, person.looks[0] === robot ? "look eye" : "look"));
+  for (const id of target ? person.looks.slice(0, person.one_of ? undefined : 1) : []) {
+    const kind = person.one_of ? "look maybe" : id === robot ? "look eye" : "look";
+    if (places.has(id)) layers.lines.append(line(person.at, places.get(id), kind));
+  }
   for (const id of person.points) if (places.has(id)) layers.lines.append(line(person.at, places.get(id), "ray"));
   const nods = person.nods ? ` (${person.nods}s)` : "";
   face(layers.bodies, person.at, direction, "person", person.id, `${person.id}${nods}`, person.speaks);

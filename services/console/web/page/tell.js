@@ -11,16 +11,16 @@ export function described(element, words) {
   };
 }
 
-const list = (ids) => (ids.length > 1 ? `${ids.slice(0, -1).join(", ")} and ${ids.at(-1)}` : ids[0]);
+export const list = (ids, last = "and") => (ids.length > 1 ? `${ids.slice(0, -1).join(", ")} ${last} ${ids.at(-1)}` : ids[0]);
 
 // A sentence for each who is there: "ann looks at robot, points at blue square, speaks."
 export function sceneInWords({ scene }) {
   const { body, things, people, robot } = scene;
   const labels = new Map(things.map((each) => [each.id, each.label || each.id]));
-  const named = (ids) => list(ids.map((id) => labels.get(id) ?? id));
+  const named = (ids, last) => list(ids.map((id) => labels.get(id) ?? id), last);
   const sentence = (who, does) => `${who} ${does.filter(Boolean).join(", ") || "is there"}.`;
   const told = people.filter((each) => each.present).map((each) => sentence(each.id, [
-    each.looks?.length ? `looks at ${named(each.looks)}` : each.looks ? "looks away" : "",
+    each.looks?.length ? `looks at ${named(each.looks, each.one_of ? "or" : "and")}` : each.looks ? "looks away" : "",
     each.points.length ? `points at ${named(each.points)}` : "",
     each.acts.length ? `moves ${named(each.acts)}` : "",
     each.nods ? `${each.nods}s` : "",

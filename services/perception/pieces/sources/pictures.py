@@ -24,8 +24,7 @@ class _PictureSource(PieceSource):
         for image, at in self._pictures.taken():
             if finder is None or image.shape[:2] != size:
                 size, finder = image.shape[:2], self._finder(image)
-            pieces, bare = finder.find(image)
-            yield SpottedPieces(at=Stamp("", at), pieces=tuple(pieces), bare=tuple(bare))
+            yield SpottedPieces(at=Stamp("", at), **finder.find(image)._asdict())
 
     def _finder(self, image: Image) -> PieceFinder:
         of = self._settings

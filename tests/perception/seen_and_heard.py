@@ -1,0 +1,84 @@
+"""Appendix B from rendered film and spoken sound alone, beside the same person told exactly: their connection events.
+
+python -m tests.perception.seen_and_heard [--seed 0] [--looks 0]     (`make eyes` fetches what it needs; ten minutes)
+
+--looks: number of the person, of those of whom nothing is learned. docs/eyes.md has the differences.
+"""
+
+import argparse
+import tempfile
+from functools import partial
+from pathlib import Path
+from unittest.mock import patch
+
+from engage_hri.schemas.perception import Utterance
+from engage_hri.services.control.config import ControlConfig
+from engage_hri.services.perception.eyes import service as eyes
+from engage_hri.services.perception.hearing import device
+from engage_hri.services.perception.hearing.config import HearingConfig
+from engage_hri.services.perception.hearing.service import hear
+from engage_hri.services.perception.pieces import service as pieces
+from engage_hri.services.perception.pieces.config import PiecesConfig
+from engage_hri.services.runtime.service import Service
+from engage_hri.services.runtime.virtual_time import run_virtual
+from engage_hri.services.tangram.people import service as simulation
+from tests.perception.eyes.film_of_looks import EYES
+from tests.perception.filmed_room import (
+    WORDS,
+    FilmedRoom,
+    FilmingFaces,
+    FilmingTable,
+    TalkingPerson,
+    colors,
+    microphone,
+)
+from tests.perception.pieces.tables import EYE
+from tests.scenario.playing import Record, play
+from tests.scenario.test_appendix_b import EXPECTED, by_step
+
+SPEAKING = ControlConfig(voice="espeak")
+OTHERS = ("no", "which one")
+"""Phrases that the recognizer expects, and nobody says."""
+
+
+def told(seed: int) -> Record:
+    """Play it with a person who is told exactly."""
+    with patch.object(simulation, "_human", lambda *_: TalkingPerson(seed)):
+        return run_virtual(play(resolution="table", control=SPEAKING))
+
+
+def filmed(seed: int, looks: int, folder: Path) -> Record:
+    """Play it with a person who is only seen and heard."""
+    room = FilmedRoom(seed, looks)
+    table = PiecesConfig(colors=colors(folder), field_of_view=EYE.field, place=EYE.at, tilt=-EYE.down)
+    sound = HearingConfig(source="parec", recognizer="sphinx", phrases=(*WORDS.values(), *OTHERS))
+    senses: dict[str, Service] = {
+        "simulation": room.live, "eyes": partial(eyes.see, config=EYES),
+        "pieces": partial(pieces.keep_an_eye, config=table), "hearing": partial(hear, config=sound),
+    }  # fmt: skip
+    with (
+        patch.object(eyes, "InsideWatching", FilmingFaces(room)),
+        patch.object(pieces, "InsideWatching", FilmingTable(room)),
+        patch.object(device, "opened", microphone(room)),
+    ):
+        return run_virtual(play(resolution="table", control=SPEAKING, people=senses))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--looks", type=int, default=0)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        records = told(options.seed), filmed(options.seed, options.looks, Path(folder))
+    for name, record in zip(("told", "seen and heard"), records, strict=True):
+        words = [each.text for each in record.messages(Utterance) if each.final]
+        print(f"{name}: {len(record.outcomes)} fragments, {len(record.events)} events; words: {', '.join(words)}")
+    steps = [by_step(record) for record in records]
+    for step in EXPECTED["table"]:
+        for name, each in zip(("told", "seen"), steps, strict=True):
+            print(f"{step:8s} {name}  {', '.join(each.get(step, []))}")
+
+
+if __name__ == "__main__":
+    main()
