@@ -1,8 +1,8 @@
 """What a robot's head did in a conversation, as an annotator would find it: from arrivals and departures alone.
 
-Input is what was on the bus. Looks are those that control has reported of the eyes, at the instants at which they came
-to rest and left; speech is that which was heard. Of generation only the fragments count, as the manager sent them: to
-whom a turn was. What the head was ordered to do, and why, is not read. Times are seconds.
+Input is what was on the bus. Looks are those that control has reported of the eyes, at the instants at which they
+came to rest and left; speech is that which was heard. Of generation only the fragments count, as the manager sent
+them: to whom a turn was. What the head was ordered to do, and why, is not read. Times are seconds.
 """
 
 from bisect import bisect_right
@@ -41,7 +41,7 @@ class Span(NamedTuple):
 
 
 def spans(messages: Iterable[Message], actor: str, action: str) -> list[Span]:
-    """Actions of one kind of one actor that are over, by their beginning. One that is told anew ends the one before."""
+    """Actions of one kind of one actor that are over. One that is told anew ends the one before."""
     found: list[Span] = []
     began: ActionBegan | None = None
     for message in messages:
@@ -137,6 +137,7 @@ def findings(messages: list[Message], robot: str = "robot") -> HeadFindings:
     soon = [_is_on(looks, at, to or people, 0.5) for at, to in ends]
     at_faces = [each for each in looks if each.what in people]
     heard = list(to_robot(messages, robot))
+    gaps = (later.began - one.ended for one, later in pairwise(at_faces))
     mutual = list(_mutual(messages, looks, people, robot))
     following = dict(pairwise(looks))
     broken = [
@@ -155,7 +156,7 @@ def findings(messages: list[Message], robot: str = "robot") -> HeadFindings:
         turns_soon=sum(soon),
         heard=sum(each.length for each in heard),
         heard_on_face=sum(seconds(each, (look for look in looks if look.what == each.what)) for each in heard),
-        aways=tuple(later.began - one.ended for one, later in pairwise(at_faces) if later.began - one.ended > AT_ONCE),
+        aways=tuple(gap for gap in gaps if gap > AT_ONCE),
         mutual=len(mutual),
         broken_by_hands=len(broken),
         lengths=tuple(each.length for each in looks),
