@@ -190,9 +190,9 @@ def test_what_waits_is_told_from_the_highest_to_the_lowest_with_its_reason() -> 
     ] == [
         ("inhibition", 1, "", "manager: hold"),
         ("fragment", 2, "other", "look"),
-        ("response", 4, "piece", "directed gaze of human"),
-        ("hands", 5, "hand", "moves"),
-        ("face", 6, "human", "nearest when it came"),
+        ("response", 5, "piece", "directed gaze of human"),
+        ("hands", 6, "hand", "moves"),
+        ("face", 7, "human", "nearest when it came"),
     ]
 
 

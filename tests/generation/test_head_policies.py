@@ -16,7 +16,7 @@ from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.head.arbiter import Arbiter
 from engage_hri.services.generation.head.maintenance_policy import FaceWatch
-from engage_hri.services.generation.head.policies import OWN, arranged
+from engage_hri.services.generation.head.policies import ORDERS, OWN, arranged
 from engage_hri.services.generation.head.policy import HeadPolicy
 from engage_hri.services.generation.head.scene import Observation
 from tests.control.test_offers import install as install
@@ -72,7 +72,8 @@ def test_priorities_are_counted_from_the_order_one_for_each_kind() -> None:
     alone = Arbiter("robot", GenerationConfig())
 
     assert {policy.name: policy.priority for policy in alone._policies} == {
-        "inhibition": 1, "fragment": 2, "glance": 3, "response": 4, "listening": 4, "hands": 5, "face": 6,
+        "inhibition": 1, "fragment": 2, "glance": 3, "aversion": 4, "response": 5, "mutual": 5, "listening": 5,
+        "hands": 6, "face": 7,
     }  # fmt: skip
 
 
@@ -81,7 +82,7 @@ def test_a_policy_of_others_gets_the_head_in_its_place_and_only_then() -> None:
     with_piece.until(22.0)
     assert with_piece.owners[-1] == (20.0, "piece", "piece")
     assert with_piece.rulings[-1].owner.priority == 3
-    assert [claim.priority for claim in with_piece.rulings[-1].waiting if claim.kind == "face"] == [7]
+    assert [claim.priority for claim in with_piece.rulings[-1].waiting if claim.kind == "face"] == [8]
 
     with_piece.do(lambda arbiter: arbiter.fragment_gazes("other"))
     assert with_piece.owner == "fragment"
@@ -116,7 +117,7 @@ def test_a_mistake_of_ours_is_raised(monkeypatch: pytest.MonkeyPatch) -> None:
         Stage().feed(world())
 
 
-@pytest.mark.parametrize("off", ["glance", "response", "listening", "hands", "face"])
+@pytest.mark.parametrize("off", [name for name in OWN if name not in ORDERS])
 def test_each_can_be_off(off: str) -> None:
     assert [*arranged(GenerationConfig(policies_off=(off,)), {})] == [name for name in OWN if name != off]
 
