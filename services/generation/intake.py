@@ -39,7 +39,7 @@ from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.exchange import NAME, AnswerCame, GenerationBegan, OwnSight, SendRequest
 from engage_hri.services.generation.fragment_check import lacks_people
 from engage_hri.services.generation.fragments import Fragments
-from engage_hri.services.generation.head.arbiter import Arbiter
+from engage_hri.services.generation.head.arbiter import Arbiter, Nod, Shift
 from engage_hri.services.generation.head.policy import HeadPolicy
 from engage_hri.services.generation.inhibitions import Leases
 from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports
@@ -372,11 +372,16 @@ class GenerationIntake:
         if ruling.changed:
             since = Stamp(self._clock.name, ruling.since)
             self._publish(keys.HEAD_OWNER, HeadOwner(owner=ruling.owner, since=since, waiting=ruling.waiting))
-        for order in filter(None, (ruling.shift, ruling.nod)):
-            id = f"{self._session}/{order.id}"
-            if order is ruling.shift:
-                self._shifts[id] = order.id
-            self._outputs.append(SendRequest(keys.BLOCK, PerformBlock(id=id, block=order.block)))
+        if ruling.shift is not None:
+            self._shifts[self._send(ruling.shift)] = ruling.shift.id
+        if ruling.nod is not None:
+            self._send(ruling.nod)
+
+    def _send(self, order: Shift | Nod) -> str:
+        """Have an order of the arbiter performed. Returns the id of the request."""
+        id = f"{self._session}/{order.id}"
+        self._outputs.append(SendRequest(keys.BLOCK, PerformBlock(id=id, block=order.block)))
+        return id
 
 
 def _how(cancel: Cancel) -> Literal["lapsed", "released", "owner_lost"]:
