@@ -239,8 +239,8 @@ class TurnClosed(Struct, frozen=True, kw_only=True, tag="turn_closed", omit_defa
 class Claim(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """A wish for the robot's gaze, by which the arbiter decides about the head.
 
-    kind: `inhibition`, `fragment`, `glance`, `response`, `hands`, `face`, that of an installed package's policy, or
-    `none`.
+    kind: `inhibition`, `fragment`, `glance`, `aversion`, `response`, `hands`, `face`, that of an installed package's
+    policy, or `none`.
     priority: 1 (the strongest) to the number of kinds that the robot follows; 0 with kind `none`.
     target: entity id; empty: hold the direction.
     reason: why, in words, for people.

@@ -48,6 +48,7 @@ LONG = {
     "recording/test_tiers_at_random.py": "a whole session against an oracle; test_tiers.py has the rules",
     "recording/test_window_oracle.py": "a whole session against an oracle; test_player.py has the rules",
     "tangram/people/test_stochastic_task.py": "whole tasks with a person drawn by chance",
+    "study/test_heads_like_peoples.py": "whole sessions; generation/test_living_head.py has each policy",
     "test_skips.py": "each test runs pytest; it guards a tool and not the robot",
     "cli/test_simulate.py": "whole tasks in processes of their own; study/ has what is made of them",
     "control/mujoco/test_beside.py": "another robot in physics; test_mujoco_contract.py has all laws",

@@ -13,7 +13,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import GazeShift, TurnSignal
+from engage_hri.schemas.behaviors import GazeShift, Speech, TurnSignal
 from engage_hri.schemas.blocks import (
     BlockOutcome,
     InterruptBehavior,
@@ -29,6 +29,7 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import ActionEnded, Utterance
 from engage_hri.schemas.recognition import ConnectionEvent, Interjection, SignalTurn
 from engage_hri.schemas.requests import Accepted, Heard, Refused
+from engage_hri.schemas.text import word_count
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import Sight, Silences
@@ -408,6 +409,7 @@ class Fragments:
         performance.begin(made)
         performance.world = seen
         self._turns.fragment_begins(turn.turn)
+        self._arbiter.says(sum(word_count(each.text) for each in made.block.behaviors if isinstance(each, Speech)))
         if not performance.accepted:  # From here on the robot may speak.
             self._tell(AnswerRequest(Heard(id=performance.request.id)))
         follows = tuple([each.fragment.id for each in followed])

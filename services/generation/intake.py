@@ -39,7 +39,7 @@ from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.exchange import NAME, AnswerCame, GenerationBegan, OwnSight, SendRequest
 from engage_hri.services.generation.fragment_check import lacks_people
 from engage_hri.services.generation.fragments import Fragments
-from engage_hri.services.generation.head.arbiter import Arbiter
+from engage_hri.services.generation.head.arbiter import Arbiter, Nod, Shift
 from engage_hri.services.generation.head.policy import HeadPolicy
 from engage_hri.services.generation.inhibitions import Leases
 from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports
@@ -197,7 +197,9 @@ class GenerationIntake:
                 self._fragments.feed(message, now)
             case Utterance(text=text, began=began, final=is_final):
                 is_echo = began != message.at and self._own_words.are(text, self._instant(began), is_final=is_final)
-                self._fragments.feed(replace(message, text="") if is_echo else message, now)
+                heard = replace(message, text="") if is_echo else message
+                self._fragments.feed(heard, now)
+                self._arbiter.feed(heard, now)
             case Unreadable(block=block, fault=fault):
                 self._warn(block, "PARSING_FAILURE", fault.within(block))
             case PeerGone(participant="control"):
@@ -238,7 +240,9 @@ class GenerationIntake:
             self._fragments.answer(came.id, came.answer, now)
         elif came.answer is not None and not isinstance(came.answer, Accepted):
             del self._shifts[came.id]
-            if not (isinstance(came.answer, BlockOutcome) and came.answer.status == "done"):
+            if isinstance(came.answer, BlockOutcome) and came.answer.status == "done":
+                self._arbiter.shift_arrived(shift, now)
+            else:
                 self._arbiter.shift_failed(shift, now)
 
     def _look(self, own: OwnSight) -> None:
@@ -369,9 +373,15 @@ class GenerationIntake:
             since = Stamp(self._clock.name, ruling.since)
             self._publish(keys.HEAD_OWNER, HeadOwner(owner=ruling.owner, since=since, waiting=ruling.waiting))
         if ruling.shift is not None:
-            id = f"{self._session}/{ruling.shift.id}"
-            self._shifts[id] = ruling.shift.id
-            self._outputs.append(SendRequest(keys.BLOCK, PerformBlock(id=id, block=ruling.shift.block)))
+            self._shifts[self._send(ruling.shift)] = ruling.shift.id
+        if ruling.nod is not None:
+            self._send(ruling.nod)
+
+    def _send(self, order: Shift | Nod) -> str:
+        """Have an order of the arbiter performed. Returns the id of the request."""
+        id = f"{self._session}/{order.id}"
+        self._outputs.append(SendRequest(keys.BLOCK, PerformBlock(id=id, block=order.block)))
+        return id
 
 
 def _how(cancel: Cancel) -> Literal["lapsed", "released", "owner_lost"]:

@@ -56,11 +56,15 @@ class Grab(Struct, frozen=True):
 
 
 class Lay(Struct, frozen=True):
-    """Move a piece to where it touches `side` of `landmark`."""
+    """Move a piece to where it touches `side` of `landmark`.
+
+    fits: time for which it is turned to and fro there, beyond that of the way.
+    """
 
     piece: str
     side: Side
     landmark: str
+    fits: Seconds = 0.0
 
 
 class Withdraw(Struct, frozen=True):

@@ -31,9 +31,12 @@ COMES: tuple[Act, ...] = (LookAt(TABLE), Pause(0.8), Sit(), Pause(0.8), LookAt(F
 GOES: tuple[Act, ...] = (LookAt(TABLE), Pause(1.0), LookAt(FACE), Pause(1.0), Leave())
 
 
-def moves(lay: Lay) -> tuple[Act, ...]:
-    """Acts that take a piece and lay it at its place."""
-    return (LookAt(lay.piece), Pause(0.3), Grab(lay.piece), LookAt(lay.landmark), lay, Withdraw())
+def moves(lay: Lay, hesitates: Seconds = 0.3) -> tuple[Act, ...]:
+    """Acts that take a piece and lay it at its place.
+
+    hesitates: time for which the person looks at it before.
+    """
+    return (LookAt(lay.piece), Pause(hesitates), Grab(lay.piece), LookAt(lay.landmark), lay, Withdraw())
 
 
 class ListeningHuman(Human):

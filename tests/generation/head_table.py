@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 TICK = 0.125
 TIMES = {
-    "DWELL": 0.25, "HAND_ONSET": 0.25, "HAND_STILLNESS": 0.75, "RESPONSE_HOLD": 0.75, "GLANCE_DURATION": 1.0,
-    "MTBCE_PRIOR": 5.75, "ONSET": 0.625, "STAYS": 1.0,
+    "DWELL": 0.25, "LEAST_FIXATION": 0.25, "HAND_ONSET": 0.25, "HAND_STILLNESS": 0.75, "RESPONSE_HOLD": 0.75,
+    "GLANCE_DURATION": 1.0, "MTBCE_PRIOR": 5.75, "ONSET": 0.375, "STAYS": 1.0,
 }  # fmt: skip
 """Times of both sides, in place of those of the arbiter."""
 FACE_LOST = 2.0
@@ -50,6 +50,7 @@ class HeadTable:
     on_face: bool = False
     glance_until: float | None = None
     let_go: float | None = None
+    looks_since: float = 0.0
     base: str = ""
     held: str = ""
     changes: list[tuple[float, str, str]] = field(default_factory=list)
@@ -149,6 +150,8 @@ class HeadTable:
         else:
             self.let_go = self.now if self.let_go is None else self.let_go
             next_owner = best if self.now - self.let_go >= TIMES["DWELL"] else kind
+        if self._is_brief(next_owner, wants.get(next_owner, self.owner[1])):
+            next_owner, wants = kind, {kind: self.owner[1]}
         if next_owner != kind:
             self.let_go = None
             if kind == "glance":
@@ -158,10 +161,18 @@ class HeadTable:
         owner = (next_owner, wants.get(next_owner, self.owner[1]))
         if next_owner == "inhibition" != kind and self.inhibited is not None and self.inhibited[0] == "hold":
             self.held = self.fragment or ""
+        if owner[1] != self.owner[1]:
+            self.looks_since = self.now
         if owner != self.owner:
             self.owner = owner
             self.changes.append((self.now, *owner))
         self._move_head()
+
+    def _is_brief(self, kind: str, target: str) -> bool:
+        """True if the head would leave what it has just come to, and nobody has ordered that."""
+        is_ordered = kind in ("inhibition", "fragment") or self.owner == NOBODY
+        ends = self.looks_since + TIMES["LEAST_FIXATION"]
+        return target != self.owner[1] and not is_ordered and self.now < ends
 
     def _move_head(self) -> None:
         kind, target = self.owner

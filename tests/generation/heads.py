@@ -51,16 +51,16 @@ def act(ends: bool = False) -> ActionBegan | ActionEnded:
 class Stage:
     """Time passes only through `until`; between, every deadline of the arbiter is met exactly."""
 
-    def __init__(self, **config: float) -> None:
+    def __init__(self, **config: object) -> None:
         self.arbiter = Arbiter("robot", GenerationConfig(**config))  # type: ignore[arg-type]
         self.now: Seconds = 0.0
         self.owners: list[tuple[Seconds, str, str]] = []
         self.shifts: list[tuple[Seconds, str, str]] = []
-        self.rulings: list[Ruling] = []
+        self.timed: list[tuple[Seconds, Ruling]] = []
 
     def rule(self) -> None:
         ruling = self.arbiter.rule(self.now)
-        self.rulings.append(ruling)
+        self.timed.append((self.now, ruling))
         owner = (ruling.owner.kind, ruling.owner.target)
         if not self.owners or self.owners[-1][1:] != owner:
             self.owners.append((round(self.now, 6), *owner))
@@ -86,6 +86,10 @@ class Stage:
         self.now = end
 
     @property
+    def rulings(self) -> list[Ruling]:
+        return [ruling for _, ruling in self.timed]
+
+    @property
     def owner(self) -> str:
         return self.rulings[-1].owner.kind
 
@@ -94,8 +98,9 @@ class Stage:
         return [claim.kind for claim in self.rulings[-1].waiting]
 
 
-def on_the_face(**config: float) -> Stage:
-    stage = Stage(**config)
+def on_the_face(**config: object) -> Stage:
+    """A robot that has looked at a face for long, and does so until something happens: it does not look away."""
+    stage = Stage(**{"policies_off": ("aversion",), **config})
     stage.feed(world())
     stage.until(10.0)
     stage.owners.clear()

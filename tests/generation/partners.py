@@ -222,7 +222,7 @@ async def stage(
     world: World | None = TABLE,
     costs: Mapping[str, float] | None = None,
 ) -> AsyncIterator[Partners]:
-    """The generation service among its partners."""
+    """The generation service among its partners. config: None: the defaults, but that the head does not look away."""
 
     async def body(bus: Bus, ready: Ready) -> None:
         bus.answer(keys.DESCRIBE, lambda question: _described(question))
@@ -234,7 +234,8 @@ async def stage(
     partners = Partners(ours, client, realizer)
     if world is not None:
         partners.see(world)
-    services = {"control": body, "generation": partial(generate, config=config or GenerationConfig())}
+    config = config or GenerationConfig(policies_off=("aversion",))
+    services = {"control": body, "generation": partial(generate, config=config)}
     async with running(hub, services):
         listening = asyncio.create_task(partners.listen())
         for bus in (client, realizer):

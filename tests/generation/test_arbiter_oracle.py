@@ -17,7 +17,7 @@ class Both:
     """One story told to the arbiter and to the table."""
 
     def __init__(self) -> None:
-        self.stage = Stage()
+        self.stage = Stage(policies_off=("aversion",))
         self.table = HeadTable()
         self.events: list[str] = []
         self.see()

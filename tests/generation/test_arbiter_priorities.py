@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.generation.head.arbiter import LEAST_FIXATION, ON_THE_WAY
 from tests.generation.head_stories import check
 from tests.generation.heads import (
     INHIBITED,
@@ -62,7 +63,7 @@ happenings = st.sampled_from(
 
 @settings(max_examples=100, deadline=None)
 @given(st.lists(st.tuples(happenings, st.floats(0.0, 3.0)), max_size=25))
-def test_the_head_has_one_owner_and_it_is_never_below_a_waiting_claim(
+def test_the_head_has_one_owner_and_it_is_below_a_waiting_claim_only_while_its_look_is_too_brief(
     story: list[tuple[Callable[[Stage], None], float]],
 ) -> None:
     stage = Stage()
@@ -70,13 +71,48 @@ def test_the_head_has_one_owner_and_it_is_never_below_a_waiting_claim(
         happening(stage)
         stage.until(stage.now + pause)
 
-    for ruling in stage.rulings:
-        priorities = [claim.priority for claim in ruling.waiting]
+    began, target = 0.0, ""
+    for now, ruling in stage.timed:
+        if ruling.owner.target != target:
+            began, target = now, ruling.owner.target
         assert ruling.owner.kind not in {claim.kind for claim in ruling.waiting}
-        assert all(ruling.owner.priority < priority for priority in priorities)
+        above = [claim for claim in ruling.waiting if claim.priority < ruling.owner.priority]
+        assert not above or (now < began + ON_THE_WAY and above[0].kind not in ("inhibition", "fragment"))
         if ruling.shift:
             assert ruling.shift.target == (ruling.owner.target or "other")  # held where the fragment had it
             assert ruling.owner.kind != "none"
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.tuples(happenings, st.floats(0.0, 3.0)), max_size=25))
+def test_no_look_is_brief_but_by_an_order(story: list[tuple[Callable[[Stage], None], float]]) -> None:
+    """There is no body here: the eyes are on what is to be looked at from the order on."""
+    stage = Stage()
+    for happening, pause in story:
+        if "looking_at" not in happening.__code__.co_names:
+            happening(stage)
+        stage.until(stage.now + pause)
+
+    began, target = -1.0, ""
+    for now, ruling in stage.timed:
+        if ruling.owner.target != target:
+            is_ordered = ruling.owner.kind in ("inhibition", "fragment")
+            assert is_ordered or now >= began + LEAST_FIXATION - 1e-9
+            began, target = now, ruling.owner.target
+
+
+def test_a_look_that_is_on_its_way_arrives_and_lasts_though_the_claim_is_gone() -> None:
+    stage = on_the_face()
+    stage.feed(looking_at((1.3, 0.0, 1.2), "human"))
+    stage.feed(act())
+    stage.until(10.1)
+    stage.feed(act(ends=True), event("e", "started", kind="mutual_facial_gaze", objects=()))
+    stage.feed(looking_at((0.9, 0.0, 0.9)))
+    stage.until(10.4)
+    stage.feed(looking_at((0.8, 0.0, 0.7), "hand"))
+    stage.until(12.0)
+
+    assert stage.shifts == [(10.0, "maintenance", "hand"), (10.7, "response", "human")]
 
 
 def test_a_response_elsewhere_than_a_fragment_looks_does_not_even_wait() -> None:

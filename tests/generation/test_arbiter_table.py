@@ -185,15 +185,15 @@ def test_what_waits_is_told_from_the_highest_to_the_lowest_with_its_reason() -> 
     ruling = stage.rulings[-1]
     assert ruling.changed
     assert ruling.since == 10.0
-    assert [
-        (claim.kind, claim.priority, claim.target, claim.reason) for claim in (ruling.owner, *ruling.waiting)
-    ] == [
-        ("inhibition", 1, "", "manager: hold"),
-        ("fragment", 2, "other", "look"),
-        ("response", 4, "piece", "directed gaze of human"),
-        ("hands", 5, "hand", "moves"),
-        ("face", 6, "human", "nearest when it came"),
+    claims = (ruling.owner, *ruling.waiting)
+    assert [(claim.kind, claim.target, claim.reason) for claim in claims] == [
+        ("inhibition", "", "manager: hold"),
+        ("fragment", "other", "look"),
+        ("response", "piece", "directed gaze of human"),
+        ("hands", "hand", "moves"),
+        ("face", "human", "nearest when it came"),
     ]
+    assert sorted(claim.priority for claim in claims) == [claim.priority for claim in claims]
 
 
 def test_the_first_ruling_is_news_even_if_nobody_is_there() -> None:

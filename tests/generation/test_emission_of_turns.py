@@ -50,7 +50,7 @@ def test_a_full_turn_announces_the_pair_and_ends_with_a_look_at_the_face() -> No
     assert behaviors["turn-ended"] == TurnSignal(
         id="turn-ended", turn="turn", signal="ended", actor="human", timing=(Timing("start", "s2:end"),)
     )
-    assert lines(made, "turn-timing") == ["turn-gaze:start = s2:end"]
+    assert lines(made, "turn-timing") == ["turn-gaze:stroke = s2:end"]
 
 
 @pytest.mark.parametrize(("index", "signal"), [(2, "answered"), (3, "repaired")])
@@ -108,19 +108,51 @@ def test_a_turn_without_speech_ends_when_everything_in_it_has() -> None:
 
 
 @pytest.mark.parametrize(
-    ("made", "ends", "last"),
-    [((LOOK, "it"), "=", "r-gaze"), ((POINT, "it"), "=", "r-gaze"), (("none", "it"), "after", "own")],
+    ("made", "last"), [((LOOK, "it"), "r-gaze"), ((POINT, "it"), "r-gaze"), (("none", "it"), "own")]
 )
-def test_the_last_gaze_gives_way_to_the_end_of_turn_gaze(made: Made, ends: str, last: str) -> None:
-    """A reference's gaze with the last words; a look of the author, which may begin late, once it is made, too."""
+def test_the_last_gaze_gives_way_to_the_end_of_turn_gaze(made: Made, last: str) -> None:
+    """So that the eyes are on the face when the last word ends."""
     fragment = TurnFragment(
         id="f", behaviors=(Gaze(id="own", target="human"), speech("s"), reference("r"), speech("t"))
     )
 
     assert lines(block(fragment, [made]), "turn-timing") == [
-        f"turn-gaze:start {ends} t:end",
+        "turn-gaze:stroke = t:end",
         f"turn-gaze:start = {last}:relax",
     ]
+
+
+@pytest.mark.parametrize(
+    ("timing", "is_late"),
+    [
+        ((), False), ((Timing("start", "s:start"),), False), ((Timing("start", "t:start"),), True),
+        ((Timing("start", "t:end"),), True),
+        ((Timing("start", "wave:end"),), True), ((Timing("stroke", "t:start"),), True),
+    ],
+)  # fmt: skip
+def test_a_look_that_may_go_on_after_the_words_is_made_first(timing: tuple[Timing, ...], is_late: bool) -> None:
+    own = Gaze(id="own", target="piece", timing=timing)
+    made = block(TurnFragment(id="f", behaviors=(own, speech("s"), Gesture(id="wave", lexeme="wave"), speech("t"))))
+
+    ends = "turn-gaze:start after t:end" if is_late else "turn-gaze:stroke = t:end"
+    assert ends in lines(made, "turn-timing")
+    assert start_of(by_id(made)["turn-ended"]) == ("turn-gaze:start" if is_late else "t:end")
+
+
+def test_a_look_for_which_the_words_wait_is_over_at_the_last_of_them() -> None:
+    waits = Constraint(id="c", operators=(After(ref="own:stroke", syncs=("s:start",)),))
+    made = block(TurnFragment(id="f", behaviors=(Gaze(id="own", target="piece"), speech("s")), constraints=(waits,)))
+
+    assert "turn-gaze:stroke = s:end" in lines(made, "turn-timing")
+
+
+@pytest.mark.parametrize(("made", "seen"), [((LOOK, "it"), "gaze:stroke+0.3"), ((LOOK, ""), "")])
+def test_the_look_at_the_last_reference_is_seen_before_it_gives_way(made: Made, seen: str) -> None:
+    tied = lines(block(TurnFragment(id="f", behaviors=(speech("s"), reference("r"))), [made]))
+
+    assert [line for line in tied if line.startswith("r-gaze:relax after")] == (
+        [f"r-gaze:relax after r-{seen}"] if seen else []
+    )
 
 
 @pytest.mark.parametrize("words", [(), ("r",)])
@@ -139,7 +171,7 @@ def test_a_gaze_whose_end_the_author_has_timed_keeps_it() -> None:
     own = Gaze(id="own", target="human", timing=(Timing("end", "s:start"),))
     fragment = TurnFragment(id="f", behaviors=(own, speech("s")))
 
-    assert lines(block(fragment), "turn-timing") == ["turn-gaze:start = s:end"]
+    assert lines(block(fragment), "turn-timing") == ["turn-gaze:stroke = s:end"]
 
 
 def test_gazes_and_constraints_of_the_fragment_pass_through() -> None:

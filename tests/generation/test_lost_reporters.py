@@ -76,7 +76,7 @@ async def test_the_hand_of_somebody_who_vanished_in_the_middle_of_an_act_lets_th
         await asyncio.sleep(1.0)
         held = owner(partners)
         await camera.leave()
-        await asyncio.sleep(REPORT_GRACE + 2.0)
+        await asyncio.sleep(REPORT_GRACE + 2.5)
 
         assert held[:1] == ("hands",)
         assert owner(partners)[:2] == ("face", "human")

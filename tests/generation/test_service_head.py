@@ -249,7 +249,7 @@ async def test_a_glance_is_a_shift_that_announces_an_optional_look_at_the_face(h
         assert isinstance(shift, GazeShift)
         assert (announced.kind, announced.responder) == ("mutual_facial_gaze", "human")  # type: ignore[union-attr]
         assert (announced.cause, announced.optional) == ("maintenance", True)  # type: ignore[union-attr]
-        assert [at for at, kind, _ in owners(partners) if kind == "glance"][:1] == [4.2]
+        assert [at for at, kind, _ in owners(partners) if kind == "glance"][:1] == [4.3]
 
 
 async def test_whoever_joins_late_learns_who_has_the_head(hub: MemoryHub) -> None:

@@ -87,7 +87,7 @@ async def test_words_that_have_been_said_are_not_waited_for(hub: MemoryHub) -> N
         partners.reach("a", "s", "end")
         partners.send(says("b", "end"))
 
-        assert lines(await partners.fragment_block("b")) == ["turn-gaze:start = s:end"]
+        assert lines(await partners.fragment_block("b")) == ["turn-gaze:stroke = s:end"]
 
 
 async def test_a_reference_costs_what_it_takes_from_where_the_fragments_before_it_leave_the_head(

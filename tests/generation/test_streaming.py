@@ -141,7 +141,7 @@ async def test_what_is_over_when_the_next_fragment_comes_is_not_waited_for(stage
     await stage.until("c:end")
 
     assert [line for line in stage.constraints("b") if "a:" in line] == []  # it points with the arm that is free
-    assert stage.constraints("c") == ["turn-gaze:start = s:end"]
+    assert stage.constraints("c") == ["turn-gaze:stroke = s:end"]
 
 
 async def test_the_last_glance_gives_way_to_the_look_that_ends_the_turn(stage: Robot) -> None:
@@ -150,7 +150,8 @@ async def test_the_last_glance_gives_way_to_the_look_that_ends_the_turn(stage: R
     await stage.until("a:end")
 
     reached = stage.reached
-    assert reached["a:ref-glance:relax"] == reached["b:turn-gaze:start"] == reached["b:s:end"] == 2.383333
+    assert reached["a:ref-glance:relax"] == reached["b:turn-gaze:start"]
+    assert reached["b:turn-gaze:stroke"] == reached["b:s:end"] == 2.383333
     assert reached["b:turn-ended:start"] == 2.383333
     assert stage.signals[0].signal.signal == "ended"
 

@@ -85,7 +85,8 @@ async def play(
 ) -> Record:
     """Until the manager has said goodbye. faults: of the bus. noise: of the body. habits: of the stochastic person.
     sensors: how person and table are perceived; exactly, by default. control: in place of the torso with `noise`.
-    people: services in the place of the simulated person. manager: its configuration.
+    people: services in the place of the simulated person. manager: its configuration. The robot does not look away:
+    that of the transcript does not.
     """
     received: list[Received] = []
     finished = asyncio.Event()
@@ -99,7 +100,7 @@ async def play(
         "control": partial(embody, config=control or ControlConfig(variability=Variability(seed=seed, noise=noise))),
         "realizer": partial(realize, config=RealizerConfig()),
         "recognition": partial(recognize, config=RecognitionConfig(gaze_resolution=resolution)),  # type: ignore[arg-type]
-        "generation": partial(generate, config=GenerationConfig(condition=condition)),
+        "generation": partial(generate, config=GenerationConfig(condition=condition, policies_off=("aversion",))),
         **(people or {"simulation": partial(simulate, config=person, habits=habits or Habits())}),
         "collaboration": collaboration,
     }

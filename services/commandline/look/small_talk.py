@@ -72,9 +72,6 @@ SILENCE = (
 )
 WORDS = 10.0
 """Seconds for which the robot waits for words of somebody whose voice it hears."""
-LISTENS = 2.5
-"""Seconds for which somebody has spoken when the robot nods, to say that it listens: no phrase of ours is so long,
-and its answer would wait for the end of the nod."""
 PHRASES = (
     *(phrase for phrases in RULES for phrase in phrases),
     *(f"where is the {piece}" for piece in PIECES if piece != "blue square"),
@@ -102,31 +99,20 @@ async def talk_with(robot: Robot, person: str, floor: asyncio.Lock) -> None:
     floor: of the robot, which says one thing at a time.
     """
     silence, heard_id, speaks = list(SILENCE), "", False
-    now, nods_at = asyncio.get_running_loop().time, None
-    async with asyncio.TaskGroup() as nods:
-        with robot.utterances() as utterances:
-            while True:
-                seconds, line = silence[0] if silence else (None, "")
-                if speaks:
-                    seconds = WORDS if nods_at is None else max(0.0, nods_at - now())
-                said = await utterances.next(seconds)
-                if said is None and nods_at is not None:
-                    nods_at = None
-                    if not floor.locked():
-                        nods.create_task(perform(robot, person, "backchannel", parts_of("[nod]")))
-                    continue
-                if said is None and not speaks:
-                    silence.pop(0)
-                    async with floor:
-                        await say(robot, person, line, 3)
-                spoke, speaks = speaks, said is not None and said.actor == person and not said.final
-                if not spoke or not speaks:
-                    nods_at = now() + LISTENS if speaks else None
-                if said is not None and said.actor == person and said.final and said.id != heard_id:
-                    heard_id, text = said.id, answer(said.text, (await robot.world()).objects)
-                    silence = [] if text.startswith("Goodbye") else list(SILENCE[1:])
-                    async with floor:
-                        await say(robot, person, text, 2)
+    with robot.utterances() as utterances:
+        while True:
+            seconds, line = silence[0] if silence else (None, "")
+            said = await utterances.next(WORDS if speaks else seconds)
+            if said is None and not speaks:
+                silence.pop(0)
+                async with floor:
+                    await say(robot, person, line, 3)
+            speaks = said is not None and said.actor == person and not said.final
+            if said is not None and said.actor == person and said.final and said.id != heard_id:
+                heard_id, text = said.id, answer(said.text, (await robot.world()).objects)
+                silence = [] if text.startswith("Goodbye") else list(SILENCE[1:])
+                async with floor:
+                    await say(robot, person, text, 2)
 
 
 def answer(words: str, things: Iterable[Entity] = ()) -> str:

@@ -40,7 +40,7 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.prosody import marked_up
 from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
-from engage_hri.schemas.references import type_name
+from engage_hri.schemas.references import SyncRef, type_name
 from engage_hri.schemas.text import tokens, word_count
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.block.ordering import ordered
@@ -140,6 +140,8 @@ def _lowered(speech: Speech) -> Speech:
 _PHRASE_END = re.compile(r"[.,;:!?…]+(?=\s+\w)|[。、！？，；：]+(?=\w)")
 PHRASE = 2.0
 """Least number of words between two looks at addressees: a look takes about half a second. Ours."""
+LOOK_AND_BACK = 4.0
+"""Least number of words from the last such look to the end of the turn, when the eyes are back: about 1.2 s. Ours."""
 FIGURE_LEAD: Seconds = 2.0
 """Time from gaze on target to the stroke of the point in profile figure-3.3: the figure's own."""
 
@@ -330,7 +332,8 @@ class Emission:
                     lines = as_in_the_figure(parts, preceding, self.before.speech, is_timed, FIGURE_LEAD)
                     operators += [each for each in lines if not self._is_said(each, operators)]
                 else:
-                    operators += checking_back(parts, preceding, self.before.speech, is_timed, glance)
+                    gives_way = behavior.id == last and self._gaze_follows(behavior)
+                    operators += checking_back(parts, preceding, self.before.speech, is_timed, glance, gives_way)
                     held = previous if previous is not None and behavior.id not in self.apart else None
                     if parts.gaze and look:
                         operators.append(
@@ -393,6 +396,11 @@ class Emission:
             id = self.names.fresh(f"{speech.id}-timing")
             self.constraints.append(Constraint(id=id, operators=(operator,), line=speech.line))
 
+    def _gaze_follows(self, reference: Reference) -> bool:
+        """True if the end-of-turn gaze comes right after the look of this reference."""
+        behind = self.order[self.order.index(reference) :]
+        return not any(isinstance(each, Gaze) for each in behind) and not self._wordless_at_the_end()
+
     def _last_reference(self) -> str:
         """Id of the reference with the gaze that lasts until the end-of-turn gaze; "": there is none."""
         if not self._ends_with_gaze or not self.parts:
@@ -432,14 +440,15 @@ class Emission:
                 words += word_count(self.parts[behavior.id].made.words)
             if not isinstance(behavior, Speech):
                 continue
-            if words >= PHRASE and behavior.id != self.speeches[0]:
+            least = LOOK_AND_BACK if behavior.id == self.speeches[-1] and self._ends_with_gaze else 0.0
+            if words >= PHRASE and behavior.id != self.speeches[0] and word_count(behavior.text) >= least:
                 yield f"{behavior.id}:start"
                 words = 0.0
             begins = 0
             for end in [] if behavior.markup else [found.end() for found in _PHRASE_END.finditer(behavior.text)]:
                 words += word_count(behavior.text[begins:end])
                 begins = end
-                if words >= PHRASE:
+                if words >= PHRASE and word_count(behavior.text[end:]) >= least:
                     taken = {each.id for each in behavior.marks}
                     mark = next(id for n in count(1) if (id := f"look-{n}") not in taken)
                     marks = sorted((*behavior.marks, Mark(mark, end)), key=lambda each: each.position)
@@ -498,8 +507,7 @@ class Emission:
         signal = TurnSignal(id=ended, turn=turn.turn, signal="ended", actor=actor, needs=self.hinge)
         operators: list[Operator] = []
         closing: list[BlockBehavior] = []
-        # A look of the author may go on when the words are over, or begin only then: the turn ends after it.
-        looks = any(isinstance(each, Gaze) and each.id == self.last_gaze for each in self.order)
+        looks = self._looks_late
         ends = [f"{self.speeches[-1]}:end", *self._wordless_at_the_end()] if self.speeches else []
         if self._ends_with_gaze:
             gaze = self.names.fresh("turn-gaze")
@@ -510,7 +518,7 @@ class Emission:
             if len(ends) > 1 or (ends and looks):
                 operators += [after(end, f"{gaze}:start") for end in ends]
             elif ends:
-                operators.append(same(ends[0], f"{gaze}:start"))
+                operators.append(same(ends[0], f"{gaze}:{self._met_by_the_end}"))
             else:
                 operators += self._once_all_is_done(f"{gaze}:start")
             if self.last_gaze:
@@ -524,6 +532,42 @@ class Emission:
         if operators:
             self.constraints.append(Constraint(id=self.names.fresh("turn-timing"), operators=tuple(operators)))
         return closing
+
+    @property
+    def _met_by_the_end(self) -> str:
+        """The sync point of the end-of-turn gaze that comes with the end of the last word.
+
+        Who ends a turn has looked up by then: the eyes are on the hearer's when the last word ends, and do not only
+        set out. The figure has its own times.
+        """
+        return "start" if self.figure else "stroke"
+
+    @property
+    def _looks_late(self) -> bool:
+        """True if the last gaze is one of the author that may go on, or only begin, when the words are over.
+
+        The turn ends after it. One that begins with the fragment, or by words that others follow, is over then: these
+        can wait until it is made.
+        """
+        look = next((each for each in self.order if isinstance(each, Gaze) and each.id == self.last_gaze), None)
+        if look is None:
+            return False
+        names = sum(times for (id, _), times in self.named.items() if id == look.id)
+        operators = [operator for constraint in self.fragment.constraints for operator in constraint.operators]
+        awaited = sum(isinstance(each, After) and SyncRef.parse(each.ref).behavior == look.id for each in operators)
+        spoken = [each.id for each in self.order if each.id in self._worded]
+        by_words = all(
+            timing.sync == "start" and SyncRef.parse(timing.ref).behavior in spoken[:-1] for timing in look.timing
+        )
+        behind = self.order[self.order.index(look) :]
+        is_early = any(each.id in spoken for each in behind) and by_words and names == len(look.timing) + awaited
+        return self.figure or not is_early
+
+    @property
+    def _worded(self) -> set[str]:
+        """Ids of the fragment's speeches and of its references with words."""
+        phrased = {id for id, parts in self.parts.items() if parts.phrase}
+        return {each.id for each in self.order if isinstance(each, Speech)} | phrased
 
     def _wordless_at_the_end(self) -> Sequence[str]:
         """Last sync points of the references that follow all words, by a gesture alone: the turn ends after them."""

@@ -20,6 +20,9 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.block.rewriting import Operator, Point, Replacement
 from engage_hri.services.generation.turns.policy import TurnPlan
 
+LEAST_SEEN: Seconds = 0.3
+"""Time for which the robot looks at least at what it refers to: below it nobody sees that it does."""
+
 
 class Made(Struct, frozen=True):
     """Ids of the behaviors that a block has for one reference; "": it has none.
@@ -150,11 +153,14 @@ class Parts:
         )
 
 
-def checking_back(parts: Parts, preceding: str, earlier: str, is_timed: bool, glance: str) -> list[Operator]:
+def checking_back(
+    parts: Parts, preceding: str, earlier: str, is_timed: bool, glance: str, gives_way: bool
+) -> list[Operator]:
     """Profile `check-back`: phrase, look and point begin together and last until the other has looked.
 
     preceding: the speech or phrase before this one. earlier: the last one of the turn's earlier fragments. is_timed:
-    the author has said when the reference starts. glance: the last one before it. "": there is none.
+    the author has said when the reference starts. glance: the last one before it. "": there is none. gives_way: the
+    look is the turn's last but for the one that is on the face when the last word ends.
     """
     gaze, point, phrase = parts.gaze, parts.point, parts.phrase
     operators: list[Operator] = []
@@ -167,7 +173,8 @@ def checking_back(parts: Parts, preceding: str, earlier: str, is_timed: bool, gl
         if glance:
             operators.append(after(f"{glance}:stroke", f"{gaze}:start"))
         if phrase:
-            operators.append(after(f"{phrase}:end", f"{gaze}:relax"))
+            seen = f"{gaze}:stroke+{LEAST_SEEN:g}" if gives_way else f"{phrase}:end"
+            operators.append(after(seen, f"{gaze}:relax"))
     if gaze and phrase and not point:
         operators.append(after(f"{gaze}:stroke", f"{phrase}:start"))
     if point:

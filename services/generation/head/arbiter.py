@@ -14,11 +14,11 @@ from typing import TypeVar
 
 from msgspec import Struct
 
-from engage_hri.schemas.behaviors import Event, GazeShift, Timing
+from engage_hri.schemas.behaviors import After, Constraint, Event, GazeShift, Head, Timing
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.fragments import Claim
 from engage_hri.schemas.recognition import Statistics
-from engage_hri.schemas.units import Degrees, Radians, Seconds
+from engage_hri.schemas.units import Degrees, Probability, Radians, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import Acquaintances
 from engage_hri.services.generation.config import GenerationConfig
@@ -32,6 +32,12 @@ from engage_hri.services.reports.same_people import joined
 DWELL: Seconds = 0.3
 """Time that the head stays after its owner let go, before a lower claim gets it: a claim that comes back at once
 finds it there. Ours."""
+LEAST_FIXATION: Seconds = 0.3
+"""Time for which a look at anything lasts at least, from when the eyes rest there, before a claim from glance down
+takes the head elsewhere: below it nobody has seen anything, and people's eyes take so long to react. In people's talk
+4 to 7 % of fixations are shorter."""
+ON_THE_WAY: Seconds = 2.0
+"""Time after which a look counts as over of which nobody has told that it arrived: a body may be held up. Ours."""
 LEAST_LOOK: Seconds = 0.8
 """Time for which a look at a face lasts at least before a claim from response down takes the head to another face: of
 several people who speak and look, the claims change faster than a head may. People's looks at who speaks last about a
@@ -39,6 +45,8 @@ second. Ours."""
 RETRY: Seconds = 1.0
 """Pause before a gaze shift that failed is tried again, so that a body that cannot is not asked
 all the time. Ours."""
+NOD: Probability = 0.3
+"""How large a nod is that says no more than that the robot listens: less than an answer's. Ours."""
 Answer = TypeVar("Answer")
 UP_RIGHT: Degrees = 60.0
 """Angle past the table: as far as the neck turns, at nothing that anybody could mean. Thesis 5.3."""
@@ -84,6 +92,22 @@ class Shift(Struct, frozen=True):
         return Block(id=self.id, behaviors=(shift, event))
 
 
+class Nod(Struct, frozen=True):
+    """An order to nod to a person, who speaks: a backchannel, of which recognition has to know before it sees it."""
+
+    id: str
+    person: str
+
+    @property
+    def block(self) -> Block:
+        event = Event(
+            id="backchannel", kind="backchannel", responder=self.person, cause="maintenance", needs=("nod",)
+        )
+        first = Constraint(id="first", operators=(After(ref="backchannel:start", syncs=("nod:start",)),))
+        nod = Head(id="nod", lexeme="NOD", amount=NOD)
+        return Block(id=self.id, behaviors=(event, nod), constraints=(first,))
+
+
 class Ruling(Struct, frozen=True):
     """The owner of the head. changed: owner or waiting claims differ from the last ruling, so it is published."""
 
@@ -92,6 +116,7 @@ class Ruling(Struct, frozen=True):
     waiting: tuple[Claim, ...]
     changed: bool
     shift: Shift | None = None
+    nod: Nod | None = None
 
 
 class Arbiter:
@@ -122,6 +147,8 @@ class Arbiter:
         self._lapsed: Seconds | None = None
         """Time when the owner let go, while the head still dwells on its target."""
         self._looks_since: Seconds = 0.0
+        self._rests_since: Seconds | None = 0.0
+        """Time since which the eyes rest on the owner's target; None: they are on their way."""
         self._stays_until: Seconds | None = None
         """Time until which the head stays on a face though another one is to be looked at."""
         self._base = NOWHERE
@@ -130,7 +157,7 @@ class Arbiter:
         """Target of the fragment's gaze that an inhibition with mode hold has found."""
         self._failed: tuple[Aim, Seconds] | None = None
         """Place that the last shift did not reach, and when to try it again."""
-        self._shifts = 0
+        self._shifts = self._nods = 0
 
     @property
     def _owner(self) -> Claim:
@@ -184,6 +211,10 @@ class Arbiter:
     def speak_to(self, person: str) -> None:
         self._scene.partner, self._scene.waits = person, False
 
+    def says(self, words: float) -> None:
+        """Note how many words the fragment has that is sent now."""
+        self._scene.words = words
+
     def wait_for_answers(self) -> None:
         """Note that the robot's turn is over: from now on those whom it has asked may answer."""
         self._scene.waits = True
@@ -194,6 +225,11 @@ class Arbiter:
         self._ask(lambda policy: policy.join(other, name))
         self._scene.owner = joined(self._owner, other, name)
         self._base, self._held = joined(self._base, other, name), joined(self._held, other, name)
+
+    def shift_arrived(self, id: str, now: Seconds) -> None:
+        """Note that shift `id` is at its target: a body need not tell what its eyes rest on."""
+        if id.rpartition("-")[2] == str(self._shifts) and self._rests_since is None:
+            self._rests_since = now
 
     def shift_failed(self, id: str, now: Seconds) -> None:
         """Note that shift `id` did not arrive: the same place is tried again after a pause, any other at once."""
@@ -232,7 +268,10 @@ class Arbiter:
             self._since = now
         owner = self._scene.owner = self._next_owner(claims, now)
         if owner.target != before.target:
-            self._looks_since = now
+            self._looks_since, self._rests_since = now, None
+        state = self._scene.state
+        if self._rests_since is None and (state is None or state.looking_at == owner.target):
+            self._rests_since = now
         if owner != before:
             self._lapsed = None
             arrives = owner.kind == "inhibition" != before.kind
@@ -240,12 +279,11 @@ class Arbiter:
                 self._held = Aim(self._fragments.gaze.target)
             if (owner.kind, owner.target) != (before.kind, before.target):
                 self._since = now
-        state = self._scene.state
         self._scene.head_on = owner.target or (state.looking_at if state else "") or self._base.target
         self._ask(lambda policy: policy.has_head(owner.kind == policy.kind, now))
         self._waiting = tuple(claim for claim in claims if claim.kind != owner.kind)
         changed = owner != before or self._waiting != waited
-        return Ruling(owner, self._since, self._waiting, changed, self._shift(now))
+        return Ruling(owner, self._since, self._waiting, changed, self._shift(now), self._nod(now))
 
     def _forget(self, person: str) -> None:
         self._scene.sight.forget(person)
@@ -277,12 +315,24 @@ class Arbiter:
         return answers
 
     def _next_owner(self, claims: list[Claim], now: Seconds) -> Claim:
-        """The claim that gets the head, or still the owner while its look at a face is too short."""
-        wanted, ends = self._strongest(claims, now), self._looks_since + LEAST_LOOK
-        faces = {self._owner.target, wanted.target}
-        is_brief = now < ends and len(faces) == 2 and faces <= {*self._scene.sight.present(now)}
-        self._stays_until = ends if is_brief and wanted.kind in ("response", "face") else None
+        """The claim that gets the head, or still the owner while its look is too short."""
+        wanted = self._strongest(claims, now)
+        ends = self._least_end(wanted, now)
+        is_ordered = wanted.kind in (InhibitionPolicy.kind, FragmentPolicy.kind)
+        is_brief = now < ends and wanted.target != self._owner.target and not is_ordered
+        self._stays_until = ends if is_brief else None
         return wanted if self._stays_until is None else self._owner
+
+    def _least_end(self, wanted: Claim, now: Seconds) -> Seconds:
+        """Time until which the look of the owner lasts at least before `wanted`."""
+        if self._owner is NOBODY:
+            return now
+        rests = self._rests_since
+        ends = self._looks_since + ON_THE_WAY if rests is None else rests + LEAST_FIXATION
+        faces = {self._owner.target, wanted.target}
+        if faces <= {*self._scene.sight.present(now)} and wanted.kind in ("response", "face"):
+            return max(ends, self._looks_since + LEAST_LOOK)
+        return ends
 
     def _strongest(self, claims: list[Claim], now: Seconds) -> Claim:
         best = claims[0] if claims else NOBODY
@@ -313,15 +363,17 @@ class Arbiter:
         cause = "response" if owner.kind == "response" else "maintenance"
         return Shift(f"{cause}-{self._shifts}", aim.target, glance=owner.kind == "glance", beside=aim.beside)
 
+    def _nod(self, now: Seconds) -> Nod | None:
+        if self._owner.kind in (InhibitionPolicy.kind, FragmentPolicy.kind):
+            return None
+        for person in filter(None, self._ask(lambda policy: policy.nods(now))):
+            self._nods += 1
+            return Nod(f"nod-{self._nods}", person)
+        return None
+
     def _aim(self) -> Aim:
         if self._owner.kind == "inhibition" and self._orders.mode == "hold":
             return self._held
         if self._owner.kind == "inhibition" and self._orders.mode == "stare":
-            return Aim(self._landmark(), beside=True)
+            return Aim(self._scene.landmark, beside=True)
         return Aim(self._owner.target)
-
-    def _landmark(self) -> str:
-        """The entity that the head stares past in the study's condition without gaze: a surface, else any; or ""."""
-        entities = self._scene.world.entities if self._scene.world else ()
-        surfaces = [entity.id for entity in entities if entity.kind == "surface"]
-        return next(iter([*surfaces, *(entity.id for entity in entities)]), "")

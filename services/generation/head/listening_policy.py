@@ -1,7 +1,7 @@
 """The listening policy: while the robot is silent and people speak, it looks at the speaker, as a listener does.
 
-It looks at who spoke first of those who speak. While it waits for an answer only those whom it asked draw it; while
-somebody speaks to it nobody else does.
+It looks at who spoke first of those who speak. While it waits for an answer only those whom it asked draw it, and
+when one of them speaks, only that one; while somebody speaks to it nobody else does.
 """
 
 from collections.abc import Sequence
@@ -13,8 +13,9 @@ from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.head.policy import HeadPolicy
 from engage_hri.services.generation.head.scene import HeadScene, Observation
 
-ONSET: Seconds = 0.6
-"""Time for which somebody has to speak until the robot looks there: an "uh-huh" is shorter. Ours."""
+ONSET: Seconds = 0.3
+"""Time for which somebody has to speak until the robot looks there: people react after 0.2 to 0.4 s. What is said
+into the speech of another, as most of "uh-huh" is, draws nobody's look anyway."""
 STAYS: Seconds = 1.0
 """Time after a speech for which the robot still looks at the speaker: most who pause go on. Ours."""
 
@@ -37,7 +38,12 @@ class ListeningPolicy(HeadPolicy):
         if isinstance(message, Floor):
             known, self._speaking = self._speaking, {each.actor: now for each in message.speeches}
             self._speaking |= {who: since for who, since in known.items() if who in self._speaking}
-            self.scene.to_robot = tuple(each.actor for each in message.speeches if self.scene.robot in each.to)
+            asked = self.scene.asked if self.scene.waits else ()
+            self.scene.to_robot = tuple(
+                each.actor
+                for each in message.speeches
+                if self.scene.robot in each.to or (each.actor in asked and not each.to)
+            )
 
     def recognition_lost(self) -> None:
         self._speaking, self._speaker, self._until = {}, "", None

@@ -48,7 +48,7 @@ class _Hand(Struct):
 
 
 class HandWatch(HeadPolicy):
-    """Claim 5: a hand that moves, or with which its owner manipulates something, until it has been still."""
+    """A hand that moves, or with which its owner manipulates something, until it has been still."""
 
     kind = "hands"
 
@@ -144,7 +144,7 @@ class HandWatch(HeadPolicy):
 
 
 class FaceWatch(HeadPolicy):
-    """Claim 6: the face of the person spoken to last, else the nearest one; if all are lost, the last direction.
+    """The face of the person spoken to last, else the nearest one; if all are lost, the last direction.
 
     While several people are to answer, the face of one after the other: the one named first comes last, for the look
     at the end of the turn was for that one.
@@ -197,7 +197,7 @@ class FaceWatch(HeadPolicy):
 
 
 class GlanceWatch(HeadPolicy):
-    """Claim 3: a quick look at the face when nothing has connected for longer than usual.
+    """A quick look at the face when nothing has connected for longer than usual.
 
     The quiet is counted from the last start of a connection event or from when the head last was on a face,
     whichever is later: a robot that has just looked need not check.

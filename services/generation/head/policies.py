@@ -5,8 +5,11 @@ from collections.abc import Mapping
 from engage_hri.schemas.advice import suggestion
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.head.aversion_policy import AversionPolicy
 from engage_hri.services.generation.head.listening_policy import ListeningPolicy
 from engage_hri.services.generation.head.maintenance_policy import FaceWatch, GlanceWatch, HandWatch
+from engage_hri.services.generation.head.mutual_policy import MutualGazePolicy
+from engage_hri.services.generation.head.nod_policy import NodPolicy
 from engage_hri.services.generation.head.orders import FragmentPolicy, InhibitionPolicy
 from engage_hri.services.generation.head.policy import HeadPolicy
 from engage_hri.services.generation.head.response_policy import ResponsePolicy
@@ -17,10 +20,13 @@ OWN: Policies = {
     "inhibition": InhibitionPolicy,
     "fragment": FragmentPolicy,
     "glance": GlanceWatch,
+    "aversion": AversionPolicy,
     "response": ResponsePolicy,
+    "mutual": MutualGazePolicy,
     "listening": ListeningPolicy,
     "hands": HandWatch,
     "face": FaceWatch,
+    "nods": NodPolicy,
 }
 ORDERS = "inhibition", "fragment"
 """Policies that cannot be switched off: somebody has ordered what they claim."""

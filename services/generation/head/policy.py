@@ -51,6 +51,13 @@ class HeadPolicy:
         """
         return None
 
+    def nods(self, now: Seconds) -> str:
+        """Tell to whom the robot is to nod now, on top of its gaze: id of a person; "": to nobody.
+
+        It is asked after the ruling, and not while somebody's order holds the head. now: in seconds.
+        """
+        return ""
+
     def has_head(self, has: bool, now: Seconds) -> None:
         """Note after each ruling who has the head.
 

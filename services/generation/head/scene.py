@@ -5,7 +5,7 @@ from itertools import takewhile
 
 from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.fragments import Claim
-from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, Utterance
 from engage_hri.schemas.recognition import ConnectionEvent, Floor, Statistics
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import Entity, World
@@ -14,7 +14,7 @@ from engage_hri.services.reports.action_reports import FACE_GRACE
 
 OfPeople = ActionBegan | ActionEnded | ActorFound | ActorLost
 """News of people; each policy takes what concerns it."""
-Observation = World | RobotState | Statistics | ConnectionEvent | Floor | OfPeople
+Observation = World | RobotState | Statistics | ConnectionEvent | Floor | Utterance | OfPeople
 NOBODY = Claim(kind="none", priority=0, reason="nobody has been seen")
 
 
@@ -105,6 +105,8 @@ class HeadScene:
         """True if the robot's last turn is over, and no other has begun."""
         self.to_robot: tuple[str, ...] = ()
         """Those of whom it is known that they speak to the robot now, if a policy cares for that."""
+        self.words = 0.0
+        """Number of words of the robot's fragment that was sent last."""
         self.owner = NOBODY
         self.head_on = ""
         """The target that the head is on or on its way to."""
@@ -135,11 +137,20 @@ class HeadScene:
         self.partner = name if self.partner == other else self.partner
 
     @property
+    def landmark(self) -> str:
+        """Id of what lies before the robot and is nobody: a surface, else an object; "": there is none."""
+        entities = self.world.entities if self.world else ()
+        things = [[each.id for each in entities if each.kind == kind] for kind in ("surface", "object")]
+        return next((each[0] for each in things if each), "")
+
+    @property
     def asked(self) -> tuple[str, ...]:
         """Ids of the people whose answers the robot waits for, in the order in which it named them."""
         return tuple(dict.fromkeys(self._asked.values()))
 
     def drawing(self, now: Seconds) -> list[str]:
-        """People who may draw the look: who was asked; else who speaks to the robot; else all in sight."""
+        """People who may draw the look: those asked who speak; else who was asked; else who speaks to the robot; else
+        all in sight."""
         present = self.sight.present(now)
-        return [who for who in self.asked or self.to_robot if who in present] or present
+        answer = [who for who in self.asked if who in self.to_robot]
+        return [who for who in answer or self.asked or self.to_robot if who in present] or present

@@ -36,6 +36,8 @@ PATIENCE: Seconds = 2.0
 """Time that the robot waits for a hand to go away before it judges what lies where. Ours."""
 SETTLE: Seconds = 0.75
 """Time from when a placement is seen until the robot speaks: the person looks up, and the robot looks back. Ours."""
+NEXT: Seconds = 2.0
+"""Time for which the robot thinks which piece is next. Thesis 6.1.3: about two seconds for each move."""
 PAUSE: Seconds = 0.4
 """Time between two turns of the robot. Ours."""
 THINKING: Seconds = 1.0
@@ -281,6 +283,7 @@ def task(manager: Manager) -> Plan[None]:
         instruction = manager.goal.next(pieces, given_up)
         if instruction is None:
             break
+        yield Pause(NEXT)
         number += 1
         if (yield from manager.instruct(f"move-{number}", instruction)):
             yield from manager.approve(f"good-{number}")

@@ -29,6 +29,13 @@ class Habits(Struct, frozen=True, kw_only=True):
     """Delay from the end of the turn to the answer. Table 2.1."""
     study: tuple[Seconds, Seconds, Seconds] = (4.0, 9.0, 60.0)
     """Time for which they study the pieces: the busy regime. Thesis 2.3 has it; the numbers are ours."""
+    hesitates: tuple[Seconds, Seconds, Seconds] = (0.2, 0.8, 3.0)
+    """Time for which they look at the piece before they reach for it. Ours, with the two that follow: sessions of the
+    thesis' participants take 345 s, with a standard deviation of 96 s."""
+    fits: tuple[Seconds, Seconds, Seconds] = (1.0, 7.0, 24.0)
+    """Time for which they turn it to and fro where it is to lie, until it fits. Ours."""
+    pace: tuple[Seconds, Seconds, Seconds] = (0.5, 1.0, 2.5)
+    """Factor on these two times and on those of study and search, drawn once for each person. Ours."""
     busy_answers: Probability = 0.25
     """Factor on these three shares, and on what they do unasked, while they study or move pieces. Ours."""
     search: tuple[Seconds, Seconds, Seconds] = (0.3, 1.5, 6.0)
@@ -47,9 +54,9 @@ class Habits(Struct, frozen=True, kw_only=True):
     """Share of the robot's words after which they nod, or say a brief word. Ours."""
     speaks: Probability = 0.3
     """Share of backchannels and answers that are words; the others are nods. Ours."""
-    looks_up_every: Seconds = 12.0
+    looks_up_every: Seconds = 40.0
     """Mean time between unasked looks at the robot's face, at a `propensity` of 1. Ours."""
-    directs_every: Seconds = 45.0
+    directs_every: Seconds = 90.0
     """Mean time between unasked looks or points at a piece, while the robot is silent. Ours."""
     points: Probability = 0.4
     """Share of these looks and points that are points. Ours."""

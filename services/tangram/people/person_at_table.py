@@ -113,7 +113,7 @@ class PersonAtTable:
                 following = self._table.reach(piece, now)
             case Lay(piece=piece) as lay:
                 if pose := self._place_for(lay, now):
-                    following = self._table.carry(piece, pose, now)
+                    following = self._table.carry(piece, pose, now, lay.fits)
                     yield from self._actions.begins("act", (piece,), self._stamp(now))
             case Withdraw():
                 self._table.withdraw(now)

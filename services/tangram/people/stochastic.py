@@ -9,6 +9,7 @@ from heapq import heappop, heappush
 from itertools import count
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.body import WordSpoken
@@ -85,6 +86,8 @@ class StochasticHuman(Human):
         self._gesture_until: Seconds = 0.0
         self._awaits_eyes = False
         """True while the person looks at the robot's face and it has not looked back yet."""
+        self._pace = self._drawn(habits.pace)
+        """The higher the slower."""
         self.propensity = 1.0
         """Propensity for looks at the robot's face, 0..2."""
 
@@ -300,9 +303,9 @@ class StochasticHuman(Human):
         if task == self._task:
             return
         if task.piece not in self._shown:
-            at += self._drawn(self._habits.search)
+            at += self._pace * self._drawn(self._habits.search)
         if not self._happens(self._habits.answers_turn):
-            at += self._drawn(self._habits.study)
+            at += self._pace * self._drawn(self._habits.study)
         if self._task is None:
             self._begin(task, at)
         else:
@@ -310,7 +313,8 @@ class StochasticHuman(Human):
 
     def _begin(self, task: Lay, at: Seconds) -> None:
         self._task = task
-        self.schedule(moves(task), at)
+        hesitates, fits = (self._pace * self._drawn(each) for each in (self._habits.hesitates, self._habits.fits))
+        self.schedule(moves(replace(task, fits=fits), hesitates), at)
 
     def _finish(self, now: Seconds) -> None:
         """End the task, now that the piece lies there: begin the next one, or look up."""

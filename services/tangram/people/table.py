@@ -81,26 +81,30 @@ class Table:
         x, y, _ = self.piece(piece, now).position
         return self._move(self._hand_for(piece, now), (x, y, self._holding_height), now)
 
-    def carry(self, piece: str, pose: PiecePose, now: Seconds) -> Seconds:
-        """Take the piece to `pose`, with the nearer hand. Returns the time at which it lies there."""
+    def carry(self, piece: str, pose: PiecePose, now: Seconds, fits: Seconds = 0.0) -> Seconds:
+        """Take the piece to `pose`, with the nearer hand. Returns the time at which it lies there.
+
+        fits: time that it takes longer than the way.
+        """
         entity = self.piece(piece, now)
         x, y, _ = entity.position
         hand = self._hand_for(piece, now)
         self._hands[hand] = (x, y, self._holding_height)
         turn = math.remainder(math.radians(pose.yaw) - entity.yaw, math.tau)
         end = (pose.x, pose.y, self._holding_height)
-        return self._move(hand, end, now, piece=piece, yaw=entity.yaw, turn=turn)
+        return self._move(hand, end, now, piece=piece, yaw=entity.yaw, turn=turn, longer=fits)
 
     def withdraw(self, now: Seconds) -> Seconds:
         """Take both hands back to the lap. Returns the time at which they are there."""
         return max(self._move(hand, rest, now) for hand, rest in self._rest.items())
 
     def _move(
-        self, hand: HandSide, end: Vector, now: Seconds, *, piece: str = "", yaw: float = 0.0, turn: float = 0.0
-    ) -> Seconds:
-        """Begin a movement. Returns the time at which it ends."""
+        self, hand: HandSide, end: Vector, now: Seconds, *, piece: str = "", yaw: float = 0.0, turn: float = 0.0,
+        longer: Seconds = 0.0,
+    ) -> Seconds:  # fmt: skip
+        """Begin a movement. Returns the time at which it ends. longer: than at the hand's speed."""
         start = self.hand(hand, now)
-        until = now + max(self._shortest, math.dist(start, end) / self._hand_speed)
+        until = now + max(self._shortest, math.dist(start, end) / self._hand_speed) + longer
         self._moving[hand] = Movement(
             start=start, end=end, since=now, until=until, piece=piece, yaw_start=yaw, yaw_end=yaw + turn
         )

@@ -22,6 +22,8 @@ from engage_hri.services.tangram.table import tangram_table
 ROBOT, HUMAN = "robot", "human"
 QUIET = {"looks_up_every": 1e6, "directs_every": 1e6, "backchannels": 0.0, "reports": 0.0}
 """Nothing of their own accord."""
+SWIFT = {"hesitates": (0.3, 0.3, 0.3), "fits": (0.0, 0.0, 0.0), "pace": (1.0, 1.0, 1.0)}
+"""No time but that of the hand's way."""
 PERFECT = {**QUIET, "answers_turn": 1.0, "hears": 1.0, "confuses": 0.0, "confuses_shown": 0.0, "misplaces": 0.0}
 BLUE = "Please move the blue piece so that it is touching the top of the rectangle."
 THIS = "Please move this so that it is touching the top of the rectangle."
@@ -33,7 +35,8 @@ class Watch:
 
     def __init__(self, seed: int = 0, reciprocity: float = 0.05, **habits: Any) -> None:
         self.table = Table(tangram_table())
-        self.human = StochasticHuman(tangram_table(), Habits(**habits), reciprocity, random.Random(seed), ROBOT)
+        theirs = Habits(**{**SWIFT, **habits})
+        self.human = StochasticHuman(tangram_table(), theirs, reciprocity, random.Random(seed), ROBOT)
         self.scene = PersonAtTable(self.human, self.table, robot=ROBOT, frame=1 / 15, stamp=stamp)
         self.seen: list[Message] = []
         self.now = 0.0
@@ -356,3 +359,21 @@ def test_whatever_they_begin_they_end_one_at_a_time(seed: int):
                 began = under_way.pop(action)
                 assert began.targets == targets
                 assert action == "look" or 0.0 < at.seconds - began.at.seconds < 3.0
+
+
+def taking(**habits: Any) -> tuple[float, float]:
+    """Time from the request until the piece is in the hand, and until it lies."""
+    watch = Watch(**PERFECT, search=(0.3, 0.3, 0.3), answer_delay=(0.4, 0.4, 0.4), **habits)
+    asked = watch.says(BLUE)
+    watch.wait(40.0)
+    (lies,) = (it.at.seconds for it in watch.seen if isinstance(it, ActionEnded) and it.action == "act")
+    return watch.began("act")[0] - asked, lies - asked
+
+
+def test_who_hesitates_and_turns_a_piece_to_and_fro_takes_longer_and_by_their_pace():
+    swift, slow = taking(), taking(hesitates=(1.3, 1.3, 1.3), fits=(4.0, 4.0, 4.0), pace=(1.0, 1.0, 1.0))
+    slower = taking(hesitates=(1.3, 1.3, 1.3), fits=(4.0, 4.0, 4.0), pace=(2.0, 2.0, 2.0))
+
+    assert slow == (pytest.approx(swift[0] + 1.0), pytest.approx(swift[1] + 1.0 + 4.0))
+    # The search is slower, too.
+    assert slower == (pytest.approx(slow[0] + 1.3 + 0.3), pytest.approx(slow[1] + 1.3 + 0.3 + 4.0))
