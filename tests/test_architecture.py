@@ -34,6 +34,8 @@ PURE_MACHINERY = {
     "services/runtime/intake.py", "services/runtime/parcels.py",
     "services/runtime/steps.py",
     "services/client/chunking.py", "services/client/event_stream.py", "services/client/turn_ends.py",
+    "services/client/conversation/calls.py", "services/client/conversation/dialects.py",
+    "services/client/conversation/history.py", "services/client/conversation/wire.py",
     "services/client/people/actions.py",
     "services/client/people/shared_world.py", "services/bus/deadlines.py", "services/bus/samples.py",
 }  # fmt: skip

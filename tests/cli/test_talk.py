@@ -162,6 +162,18 @@ def test_a_model_leads_it_with_the_functions_of_a_file(tmp_path: Path) -> None:
     assert (manager.phrases, manager.examples) == ((), ())
 
 
+async def test_why_a_model_gives_no_answer_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("aiohttp", reason="needs the extra `models`")
+    manager = talk.led_by_model(talk.Options(model=lambda history: 1 / 0))  # type: ignore[arg-type]
+    async with embedded(human="none") as robot, perceive("ann", hub=robot.hub):
+        talking = asyncio.create_task(manager.talk(robot))
+        await asyncio.sleep(5.0)
+        talking.cancel()
+        await asyncio.wait([talking])
+
+    assert "division by zero" in capsys.readouterr().err
+
+
 async def test_a_model_greets_who_comes_and_answers(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("aiohttp", reason="needs the extra `models`")
     said = iter((("Good morning.",), ("I am fine.",)))

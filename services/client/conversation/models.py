@@ -62,12 +62,15 @@ class FunctionModel(Model):
 
     async def reply(self, prompt: str, history: Sequence[Entry], tools: Sequence[ToolForm]) -> Bits:
         """Write the robot's next message."""
-        answer = self._function(history)
-        if isinstance(answer, AsyncIterator):
-            async for text in answer:
-                yield TextBit(text)
-        else:
-            yield TextBit(answer if isinstance(answer, str) else await answer)
+        try:
+            answer = self._function(history)
+            if isinstance(answer, AsyncIterator):
+                async for text in answer:
+                    yield TextBit(text)
+            else:
+                yield TextBit(answer if isinstance(answer, str) else await answer)
+        except Exception as error:  # as with a server: the robot says so, and the talk goes on
+            raise ModelFailed(Fault(reason=f"the function of the model has failed: {error!r}")) from error
         yield Finished()
 
 
@@ -131,7 +134,7 @@ class EndpointModel(Model):
                 async for data in response.content.iter_any():
                     yield data
         except (aiohttp.ClientError, OSError, TimeoutError) as error:
-            reason = self._without_key(f"the model's server cannot be reached: {error!r:.200}")
+            reason = self._without_key(f"the model's server cannot be reached: {str(error) or error!r:.200}")
             raise ModelFailed(Fault(reason=reason, where=self._url)) from None
 
     def _without_key(self, text: str) -> str:

@@ -38,6 +38,7 @@ from engage_hri.services.runtime.installation import extra_command, has_hearing
 from engage_hri.services.runtime.service import running
 
 if TYPE_CHECKING:
+    from engage_hri.services.client.conversation.talk import Conversation
     from engage_hri.services.client.conversation.tools import ToolSource
 
 RULES = Path(__file__).with_name("small_talk.py")
@@ -157,7 +158,11 @@ def led_by_model(options: Options) -> ManagerFile:
     named = options.model
 
     async def talk(robot: Robot) -> None:
-        async with Conversation(robot, named, tools=tools, prompt=prompt) as conversation:
+        async with (
+            Conversation(robot, named, tools=tools, prompt=prompt) as conversation,
+            asyncio.TaskGroup() as beside,
+        ):
+            telling = beside.create_task(_tell_problems(conversation), name="problems")
             known: set[str] = set()
             with robot.worlds() as worlds:
                 async for world in worlds:
@@ -165,8 +170,20 @@ def led_by_model(options: Options) -> ManagerFile:
                     for person in here - known:
                         conversation.answer(person)
                     known = here
+            telling.cancel()
 
     return ManagerFile(talk, (), ())
+
+
+async def _tell_problems(conversation: "Conversation") -> None:
+    """Tell the terminal what goes wrong with the model and its tools, each problem once until there is another."""
+    last = ""
+    async for _ in conversation.entries():
+        for problem in conversation.problems:
+            if problem != last:
+                complain(problem)
+            last = problem
+        conversation.problems.clear()
 
 
 def _tools(source: str) -> "list[ToolSource]":
