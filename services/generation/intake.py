@@ -378,7 +378,7 @@ class GenerationIntake:
             self._send(ruling.nod)
 
     def _send(self, order: Shift | Nod) -> str:
-        """Ask for an order of the arbiter. Returns the id of the request."""
+        """Send an order of the arbiter to the realizer. Returns the id of the request."""
         id = f"{self._session}/{order.id}"
         self._outputs.append(SendRequest(keys.BLOCK, PerformBlock(id=id, block=order.block)))
         return id

@@ -201,8 +201,8 @@ on a face there is nothing to glance at
 
 objects far apart are looked at one by one the nearest first
     10 gaze 0.6 -0.3 0.7; 10 event e started objects=piece,other; 12 time
-    owners: 10 face human, 10 response other, 10.8 response piece
-    shifts: 10 response other, 10.8 response piece
+    owners: 10 face human, 10 response other, 12 response piece
+    shifts: 10 response other, 12 response piece
 
 objects within one gaze are met by one look
     with gaze_half_angle=0.5

@@ -96,7 +96,7 @@ def test_no_look_is_brief_but_by_an_order(story: list[tuple[Callable[[Stage], No
     began, target = -1.0, ""
     for now, ruling in stage.timed:
         if ruling.owner.target != target:
-            is_ordered = ruling.owner.kind in ("inhibition", "fragment")
+            is_ordered = ruling.owner.kind in ("inhibition", "fragment") or not target
             assert is_ordered or now >= began + LEAST_FIXATION - 1e-9
             began, target = now, ruling.owner.target
 

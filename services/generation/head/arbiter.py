@@ -266,12 +266,11 @@ class Arbiter:
         before, waited = self._owner, self._waiting
         if waited is None:
             self._since = now
+        self._note_rest(before, now)
         owner = self._scene.owner = self._next_owner(claims, now)
         if owner.target != before.target:
             self._looks_since, self._rests_since = now, None
-        state = self._scene.state
-        if self._rests_since is None and (state is None or state.looking_at == owner.target):
-            self._rests_since = now
+        self._note_rest(owner, now)
         if owner != before:
             self._lapsed = None
             arrives = owner.kind == "inhibition" != before.kind
@@ -279,11 +278,18 @@ class Arbiter:
                 self._held = Aim(self._fragments.gaze.target)
             if (owner.kind, owner.target) != (before.kind, before.target):
                 self._since = now
+        state = self._scene.state
         self._scene.head_on = owner.target or (state.looking_at if state else "") or self._base.target
         self._ask(lambda policy: policy.has_head(owner.kind == policy.kind, now))
         self._waiting = tuple(claim for claim in claims if claim.kind != owner.kind)
         changed = owner != before or self._waiting != waited
         return Ruling(owner, self._since, self._waiting, changed, self._shift(now), self._nod(now))
+
+    def _note_rest(self, owner: Claim, now: Seconds) -> None:
+        """Note that the eyes have come to rest on the target of `owner`, if they have."""
+        state = self._scene.state
+        if self._rests_since is None and (state is None or state.looking_at == owner.target):
+            self._rests_since = now
 
     def _forget(self, person: str) -> None:
         self._scene.sight.forget(person)
