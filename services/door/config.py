@@ -16,7 +16,7 @@ class DoorConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Port; 0: any that is free, which is told."""
     roles: tuple[DoorRole, ...] = ("observer", "manager")
     """Roles for which there is a token: what each may do is as on the bus."""
-    tokens: str = "door-tokens"
+    folder: str = "door-tokens"
     """Folder with a file for each role, named after it, that holds its token; what is missing is made."""
     https: str = ""
     """File with a certificate and its key, made if there is none, or the folder of a router's keys; empty: no TLS."""

@@ -38,7 +38,7 @@ async def open_door(bus: Bus, ready: Ready, config: DoorConfig) -> None:
 
 def _tokens(config: DoorConfig) -> Mapping[str, str]:
     """The token of each role. Raises InputRefused if the folder cannot be made."""
-    folder = Path(config.tokens)
+    folder = Path(config.folder)
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     except OSError as error:
@@ -51,4 +51,4 @@ def _tell(bus: Bus, config: DoorConfig, port: int, *, is_safe: bool) -> None:
     host = f"[{config.host}]" if ":" in config.host else config.host
     journal.alert(bus.log, "the door is at %s://%s:%d/v1/", "https" if is_safe else "http", host, port)
     for role in config.roles:
-        journal.alert(bus.log, "token of the role %s: in %s", role, Path(config.tokens) / role)
+        journal.alert(bus.log, "token of the role %s: in %s", role, Path(config.folder) / role)

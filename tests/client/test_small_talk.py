@@ -101,7 +101,9 @@ async def test_its_head_says_that_it_listens_looks_at_what_it_speaks_of_and_back
             ]
         await bus.leave()
 
-    assert [each[1:] for each in began if each[0] > answered] == [("look", "table"), ("look", "ann")]
+    looks = [each for each in began if each[1] == "look"]  # it may have looked away to the table already
+    assert [each[2] for each in looks][-2:] == ["table", "ann"]
+    assert looks[-1][0] > answered
     assert [at < answered for at, action, *_ in began if at > asked and action == "nod"] == [True]
 
 

@@ -45,7 +45,7 @@ def running_door(folder: Path) -> Iterator[RunningDoor]:
     endpoint = free_endpoint()
     port = free_endpoint().rpartition(":")[2]
     door = ("run", "door", "--connect", endpoint, "--set", f"door.port={port}")
-    door += ("--set", f"door.tokens={json.dumps(str(folder / 'door-tokens'))}")
+    door += ("--set", f"door.folder={json.dumps(str(folder / 'door-tokens'))}")
     with (
         engage(folder / "up", "up", "--in-one", "--listen", endpoint, "--set", "simulation.human=attentive") as up,
         engage(folder / "door", *door) as opened,

@@ -25,7 +25,11 @@ STEP = 0.01
 WAIT = 1e6
 """Weight of waiting: so dear that a gesture is made only where nothing less will do."""
 HEADS = GenerationConfig(
-    seconds_per_head_degree=1.0, seconds_per_arm_degree=1e-9, seconds_per_word=0.0, wait_weight=WAIT
+    policies_off=("aversion",),  # what it turns away and back beside a fragment no plan knows of
+    seconds_per_head_degree=1.0,
+    seconds_per_arm_degree=1e-9,
+    seconds_per_word=0.0,
+    wait_weight=WAIT,
 )
 """Cost is degrees of the head, but for waiting."""
 ARMS = GenerationConfig(

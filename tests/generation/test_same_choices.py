@@ -73,7 +73,9 @@ def as_it_was(it: Scenario, body: Capabilities, ask: Ask) -> FragmentPlan:
         scene = _scene(it.world, body, it.permits, it.config)
         chosen = choose(made.references, scene, motions, it.config, apart)
     emitted = Emission(it.fragment, turn, chosen.choices, it.config, it.permits, chosen.hands, apart=apart).plan()
-    return replace(emitted, warnings=(*in_vain(it.fragment), *made.warnings, *chosen.warnings, *emitted.warnings))
+    return replace(
+        emitted, warnings=(*in_vain(it.fragment, turn), *made.warnings, *chosen.warnings, *emitted.warnings)
+    )
 
 
 def as_it_is(it: Scenario, body: Capabilities, ask: Ask) -> FragmentPlan:
