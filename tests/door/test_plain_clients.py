@@ -40,7 +40,7 @@ class OpenDoor(NamedTuple):
 @asynccontextmanager
 async def open_door(folder: Path, *settings: str) -> AsyncIterator[OpenDoor]:
     port = int(free_endpoint().rpartition(":")[2])
-    given = (f"door.port={port}", f"door.tokens={json.dumps(str(folder / 'tokens'))}", *settings)
+    given = (f"door.port={port}", f"door.folder={json.dumps(str(folder / 'tokens'))}", *settings)
     config = read(roster.complete(), settings=given, defaults=("simulation.human=attentive",))
     names = (*roster.ROBOT, "simulation", "door")
     async with embedding.in_memory(config, embedding.services(config, *names)):
@@ -118,7 +118,7 @@ async def test_tokens_stay_and_a_port_that_is_taken_or_a_folder_that_cannot_be_i
         assert {each.name: each.read_text() for each in door.tokens.iterdir()} == before
     (tmp_path / "file").write_text("")
     with pytest.raises(InputRefused, match="cannot be made"):
-        async with open_door(tmp_path, f"door.tokens={json.dumps(str(tmp_path / 'file'))}"):
+        async with open_door(tmp_path, f"door.folder={json.dumps(str(tmp_path / 'file'))}"):
             pass
 
     assert {*before} == {"observer", "manager"}
