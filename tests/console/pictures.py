@@ -23,7 +23,7 @@ SIZES = ((1920, 1200), (1280, 1000), (400, 1400))
 async def take_recording(url: str, port: int) -> None:
     """Go to a place in a recording, and take a picture there."""
     async with browser.at_port(port) as running, running.page() as page:
-        await page.look(1280, 800)
+        await page.look(1280, 800, calm=True)
         await page.go(url)
         await page.until("window.engage?.state.place?.at > 0.5", 60)
         await page.value(f"window.engage.send({{ do: 'play', on: false, at: {PLACE} }})")
@@ -35,19 +35,19 @@ async def take_recording(url: str, port: int) -> None:
 async def take(url: str, port: int) -> None:
     """Watch the tangram until the robot has asked for two pieces, then write a picture for each size and colour."""
     async with browser.at_port(port) as running, running.page() as page:
-        await page.look(1920, 1200)
+        await page.look(1920, 1200, calm=True)
         await page.go(url)
         await page.until("window.engage?.state.references?.length > 3", 120)
         await page.until("document.querySelector('#above .pointed')", 60)
         for width, height in SIZES:
             for dark in (False, True):
-                await page.look(width, height, dark=dark)
+                await page.look(width, height, dark=dark, calm=True)
                 await page.until(f"document.documentElement.clientWidth === {width}")
                 await page.until("document.querySelector('#above .looked')", 60)
                 await page.value("new Promise((done) => setTimeout(done, 1000))")
                 name = f"{width}-{'dark' if dark else 'light'}.png"
                 (FOLDER / name).write_bytes(await page.picture(whole=False))
-        await page.look(1280, 800)
+        await page.look(1280, 800, calm=True)
         await page.value("document.querySelector('#net').scrollIntoView()")
         await page.until("document.querySelectorAll('.net svg:not(.over) .fired').length > 4", 60)
         (FOLDER / "net.png").write_bytes(await page.picture(whole=False))

@@ -1,6 +1,6 @@
 // The scene in 3D, as large as the page: figures that move smoothly, light, shadows, and the looks that pass between them.
 import { THREE } from "three";
-import { keep, makePerson, makePiece, makeRobot, makeStool, placeOf, vector } from "../page/figures.js";
+import { CALM, isFine, keep, makePerson, makePiece, makeRobot, makeStool, placeOf, vector } from "../page/figures.js";
 
 const SMOOTH = 0.09; // seconds in which a figure comes two thirds nearer to where it is to be
 const SLOW = 45; // ms of a picture above which it gives up shadows and fine dots: without a graphics card
@@ -20,20 +20,11 @@ const LIGHTS = {
   dark: { sky: "#8fa6d8", ground: "#241c2b", ambient: 1.1, lamp: "#ffdca8", strength: 2.4, shadow: 0.45, cone: 0.5 },
 };
 
-// Where there is no graphics card the processor draws, under one of these names: smooth edges and shadows take most of its time.
-const BY_PROCESSOR = /swiftshader|llvmpipe|softpipe|basic render/i;
-function hasCard() {
-  const context = document.createElement("canvas").getContext("webgl2");
-  const names = context?.getExtension("WEBGL_debug_renderer_info");
-  return !BY_PROCESSOR.test(context?.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : context.RENDERER));
-}
-
 export function scene(place, insets) {
-  const still = matchMedia("(prefers-reduced-motion: reduce)"); // then pictures are few, and may take their time
-  const isFine = still.matches || hasCard();
-  const renderer = new THREE.WebGLRenderer({ antialias: isFine, alpha: true, powerPreference: "low-power" });
+  const fine = isFine();
+  const renderer = new THREE.WebGLRenderer({ antialias: fine, alpha: true, powerPreference: "low-power" });
   renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
-  renderer.shadowMap.enabled = isFine;
+  renderer.shadowMap.enabled = fine;
   renderer.shadowMap.type = THREE.PCFSoftShadowMap;
   renderer.toneMapping = THREE.ACESFilmicToneMapping;
   place.append(renderer.domElement);
@@ -70,7 +61,7 @@ export function scene(place, insets) {
 
   // A picture is drawn after it was asked for, by another process or a card: until it is, the browser does not come back.
   function weigh(now) {
-    if (!drawn || still.matches) return;
+    if (!drawn || CALM.matches) return;
     const took = Math.min(now - drawn, 250); // a page that was hidden comes back late, too
     drawn = 0;
     cost += (took - cost) * 0.1;
@@ -183,8 +174,8 @@ export function scene(place, insets) {
     draw(now, bonds, dark) {
       weigh(performance.now());
       const passed = Math.min(0.25, now - last);
-      const part = last === 0 || still.matches ? 1 : 1 - Math.exp(-passed / SMOOTH);
-      const isCalm = still.matches || cost > SLOW; // nothing moves but what moves out there
+      const part = last === 0 || CALM.matches ? 1 : 1 - Math.exp(-passed / SMOOTH);
+      const isCalm = CALM.matches || cost > SLOW; // nothing moves but what moves out there
       const isDrifting = !you && !isCalm;
       if (!isStale && !isDrifting) return false;
       if (passed < (cost > SLOW ? 0.15 : 0.015)) return false;

@@ -9,6 +9,18 @@ const COATS = ["#3f7f8c", "#b5654a", "#6d5aa8", "#4f7a4a", "#a8527c", "#8a6d3b"]
 const HAIR = ["#3a2a22", "#6b4a2f", "#1f1d22", "#8c6a44", "#4a3f3a"];
 const SKIN = ["#e0ac82", "#c68a5e", "#f0c8a4", "#9a6a48"];
 
+// Where there is no graphics card the processor draws, under one of these names: smooth edges and shadows take most of its time.
+const BY_PROCESSOR = /swiftshader|llvmpipe|softpipe|basic render/i;
+function hasCard() {
+  const context = document.createElement("canvas").getContext("webgl2");
+  const names = context?.getExtension("WEBGL_debug_renderer_info");
+  return !BY_PROCESSOR.test(context?.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : context.RENDERER));
+}
+
+// Whether pictures are drawn finely. Who wants no motion has few of them: they may take their time.
+export const CALM = matchMedia("(prefers-reduced-motion: reduce)");
+export const isFine = () => CALM.matches || hasCard();
+
 export const vector = (at) => new THREE.Vector3(...at);
 export const material = (color, more = {}) => new THREE.MeshStandardMaterial({ color, roughness: 0.55, ...more });
 const choice = (list, id) => list[[...id].reduce((sum, sign) => (sum * 31 + sign.charCodeAt(0)) >>> 0, 7) % list.length];

@@ -1,6 +1,6 @@
 // The scene in 3D. Drawn when a frame has changed it, or when somebody turns it: never for nothing.
 import { CSS2DObject, CSS2DRenderer, OrbitControls, THREE } from "three";
-import { keep, makePerson, makePiece, makeRobot, material, placeOf } from "./figures.js";
+import { isFine, keep, makePerson, makePiece, makeRobot, material, placeOf } from "./figures.js";
 import { element, isDark } from "./look.js";
 import { described, sceneInWords } from "./tell.js";
 
@@ -17,7 +17,7 @@ export function space(panel, order) {
   const place = panel.querySelector(".space");
   let renderer;
   try {
-    renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
+    renderer = new THREE.WebGLRenderer({ antialias: isFine(), alpha: true });
   } catch {
     place.replaceChildren(element("p", { class: "none" }, "This browser shows no 3D (WebGL is off). The table from above has the same."));
     return { take() {} };
