@@ -232,6 +232,7 @@ TABLE: tuple[Row, ...] = (
     Row("control", "publishes", keys.ROBOT_SOUND, "told while somebody plays it, or tells it from people's voices"),
     Row("perception", "publishes", keys.ANY_LANDMARKS, "of cameras: points of faces, for recordings"),
     Row("perception", "subscribes", keys.ANY_LANDMARKS, "for eyes, of the cameras of pages"),
+    Row("perception", "subscribes", keys.ANY_HEAD_POSE, "for hearing: whose lips move with a voice"),
     Row("perception", "publishes", keys.ANY_SOUND, "of microphones"),
     Row("perception", "subscribes", keys.ANY_SOUND, "for those who hear what people say"),
     Row("perception", "subscribes", keys.ROBOT_SOUND, "told from the voices of people"),

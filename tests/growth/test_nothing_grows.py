@@ -10,7 +10,7 @@ from pathlib import Path
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.deadlines import SLACK
 from engage_hri.services.bus.subscription import KEYS_KEPT
-from engage_hri.services.client.robot import UTTERANCES_KEPT
+from engage_hri.services.client.performing import UTTERANCES_KEPT
 from engage_hri.services.console.view import EVENTS_KEPT, WARNINGS_KEPT
 from engage_hri.services.console.view import UTTERANCES_KEPT as UTTERANCES_SHOWN
 from engage_hri.services.generation.turns.outcomes import MOST as WORDS_KEPT

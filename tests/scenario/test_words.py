@@ -238,7 +238,7 @@ async def test_all_that_the_simulated_person_says_are_words_of_events(perception
 
     last = {each.id: each for each in told if isinstance(each, ConnectionEvent)}
     said = [each.text for each in told if isinstance(each, Utterance) and each.final]
-    assert len(said) >= 3
+    assert len(said) >= 2
     assert sorted(each.words for each in last.values() if each.words) == sorted(said)
 
 

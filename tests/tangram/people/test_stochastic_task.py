@@ -50,7 +50,7 @@ async def test_words_alone_are_enough():
 
 async def test_who_gets_nearly_everything_wrong_is_asked_again_and_again():
     inept = Habits(hears=0.7, confuses=0.4, confuses_shown=0.4, misplaces=0.4, answers_turn=0.3)
-    record = await plays(2, "degraded-generation", inept)
+    record = await plays(1, "degraded-generation", inept)
 
     assert times_asked_again(record) > 4
     assert "goodbye" in record.outcomes
