@@ -85,7 +85,10 @@ async def test_a_program_with_websockets_writes_a_turn_stops_it_and_knows_what_w
 async def test_a_stranger_gets_nothing_and_what_is_too_large_is_refused(tmp_path: Path) -> None:
     async with open_door(tmp_path) as door, aiohttp.ClientSession(f"http://127.0.0.1:{door.port}") as stranger:
         paths = ("/v1/world", "/v1/openapi.json", "/v1/news", "/v1/world?token=guessed")
-        codes = [(await stranger.get(path)).status for path in paths]
+        codes = []
+        for path in paths:
+            async with stranger.get(path) as refused:
+                codes.append(refused.status)
         async with stranger.ws_connect("/v1/news") as link:
             closed = await link.receive()
         async with stranger.post("/v1/turn", data=BytesIO(b"x" * 1048577), headers=door.headers()) as large:
