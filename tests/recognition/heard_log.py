@@ -98,11 +98,11 @@ class HeardLog:
     def misnamed(self) -> Iterator[str]:
         """What is told by another id than the person's own, although it is known that they are one."""
         last: dict[str, ConnectionEvent] = {}
-        remembered: set[str] = set()
+        remembered: dict[str, set[str]] = {}
         for number, each in enumerate(self.told):
             joined = {id for id, since in self.joined.items() if since <= number}
-            if number in self.joined.values():
-                remembered |= {*list(last)[-REMEMBERED:]}
+            for id in joined - remembered.keys():
+                remembered[id] = {*list(last)[-REMEMBERED:]}
             match each:
                 case ConnectionEvent(initiator=initiator, responder=responder, answered_by=by):
                     named, last[each.id] = {initiator, responder, by}, each
@@ -115,7 +115,8 @@ class HeardLog:
             if named & joined:
                 yield f"told by the other id: {each}"
         for each in last.values():
-            if each.id in remembered and {each.initiator, each.responder, each.answered_by} & self.joined.keys():
+            named = {each.initiator, each.responder, each.answered_by}
+            if any(id in named and each.id in events for id, events in remembered.items()):
                 yield f"not told again by the own id: {each}"
 
     def id(self, person: str) -> str:
