@@ -148,6 +148,8 @@ class Utterance(Struct, frozen=True, kw_only=True, tag="utterance", omit_default
     text: all of it so far; empty: words will follow. final: False: a partial result, which the next may change.
     began: when they began to say it; of a typed line the same as `at`. ended: when they had said it; None: by `at`.
     at: when this much was known. to: ids of those to whom it was said, if perception knows. confidence: in the words.
+    finished: how sure it is by its sound that the person has finished, and does not go on after the silence that has
+    come; None: nobody judges that.
     """
 
     actor: str
@@ -159,3 +161,4 @@ class Utterance(Struct, frozen=True, kw_only=True, tag="utterance", omit_default
     final: bool = True
     to: Annotated[tuple[str, ...], Meta(max_length=MOST_ADDRESSEES)] = ()
     confidence: Probability = 1.0
+    finished: Probability | None = None

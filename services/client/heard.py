@@ -288,6 +288,7 @@ class HeardFeed(Reading[HeardTurn]):
             who=turn.who,
             text=turn.text,
             spoken=turn._spoken,
+            finished=max(turn._utterances.values(), key=_beginning).finished if turn._utterances else None,
             looks_at_robot=self._looks.get(turn.who),
             language=self._language,
             pauses=self._habits.of(turn.who),
@@ -303,3 +304,7 @@ class HeardFeed(Reading[HeardTurn]):
             self._done[turn.who, id] = None
         while len(self._done) > KNOWN:
             del self._done[next(iter(self._done))]
+
+
+def _beginning(utterance: Utterance) -> Seconds:
+    return utterance.began.seconds

@@ -7,7 +7,8 @@ pauses within a turn last longer than that. What they go by is whether the words
 Jefferson 1974, Language 50), how it sounds, which words do not tell, and that a speaker who is done looks at the
 other (Kendon 1967, Acta Psychologica 26). So the silence that ends a turn is counted in this order:
 
-- words that end a sentence: `COMPLETE`; words after which something must follow: `OPEN`; else `UNSURE`;
+- words that end a sentence: `COMPLETE`; words after which something must follow: `OPEN`; else how it sounds, where
+  somebody judges that (`hearing.turn_detector`): finished, `COMPLETE`, or not, `OPEN`; else `UNSURE`;
 - by the language, as far from English as the gaps of its speakers are (`BY_LANGUAGE`);
 - times `AT_THE_ROBOT` for who looks at the robot, times `AWAY` for who looks at something else;
 - at least as long as this person's own pauses within turns have been lately, where the words leave it open.
@@ -21,7 +22,7 @@ from collections.abc import Iterable
 
 from msgspec import Struct
 
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.text.ends import ends
 
 COMPLETE: Seconds = 0.35
@@ -61,6 +62,7 @@ class SoFar(Struct, frozen=True, kw_only=True):
 
     who: id of the person. text: the words so far, as they are known.
     spoken: seconds of voice so far.
+    finished: how sure it is by the sound of what was said last that the person has finished; None: nobody judges.
     looks_at_robot: True: the person looks at the robot; None: nobody tells where this person looks.
     language: as a recognizer calls it, such as `en-GB`; empty: not known.
     pauses: the person's last pauses within turns, seconds.
@@ -69,6 +71,7 @@ class SoFar(Struct, frozen=True, kw_only=True):
     who: str
     text: str
     spoken: Seconds
+    finished: Probability | None = None
     looks_at_robot: bool | None = None
     language: str = ""
     pauses: tuple[Seconds, ...] = ()
@@ -84,6 +87,8 @@ class EndOfTurn:
         """
         language = turn.language.partition("-")[0].lower()
         is_open = leaves_open(turn.text, language)
+        if is_open is None and turn.finished is not None:
+            is_open = turn.finished < 0.5
         rest = OPEN if is_open else COMPLETE if is_open is False else UNSURE
         rest = max(0.15, rest + BY_LANGUAGE.get(language, 0.0))
         if turn.looks_at_robot is not None:

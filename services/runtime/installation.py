@@ -78,9 +78,11 @@ def _from_here(path: Path) -> str:
 if TYPE_CHECKING:
     from importlib.metadata import Distribution, EntryPoint
 
-GROUPS = BODIES, VOICES, SERVICES, RECOGNIZERS, LANDMARKS, PIECES, TABLES, HEAD_POLICIES, TURN_ENDS = (
-    "engage.bodies", "engage.voices", "engage.services", "engage.recognizers", "engage.landmarks", "engage.pieces",
-    "engage.tables", "engage.head_policies", "engage.turn_ends",
+GROUPS = (
+    BODIES, VOICES, SERVICES, RECOGNIZERS, TURN_DETECTORS, LANDMARKS, PIECES, TABLES, HEAD_POLICIES, TURN_ENDS,
+) = (
+    "engage.bodies", "engage.voices", "engage.services", "engage.recognizers", "engage.turn_detectors",
+    "engage.landmarks", "engage.pieces", "engage.tables", "engage.head_policies", "engage.turn_ends",
 )  # fmt: skip
 
 

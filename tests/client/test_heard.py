@@ -64,6 +64,9 @@ def test_the_silence_follows_words_language_gaze_and_the_person() -> None:
     assert ends.silence(so_far("blue", language="da")) > UNSURE > ends.silence(so_far("blue", language="ja"))
     assert ends.silence(so_far("blue", pauses=(0.2, 1.1, 1.2, 1.0))) == pytest.approx(1.3)
     assert ends.silence(so_far("Where is it?", pauses=(1.1, 1.2))) == COMPLETE
+    assert [ends.silence(so_far("blue", finished=sure)) for sure in (0.1, 0.9)] == [OPEN, COMPLETE]
+    assert ends.silence(so_far("Where is it?", finished=0.1)) == COMPLETE
+    assert ends.silence(so_far("it is the", finished=0.9)) == OPEN
     assert ends.silence(so_far("it is the", looks_at_robot=False, pauses=(9.0,))) == LONGEST
 
 

@@ -220,7 +220,7 @@ async def test_the_page_has_what_finds_faces_from_here_and_nothing_else(
         missing = await browser.get(wanted)
         assert (missing.status_code, "engage eyes install" in missing.text) == (404, True)
 
-        for parcel in PARCELS:
+        for parcel in PARCELS["eyes"]:
             for name in parcel.names():
                 (tmp_path / "eyes" / name).write_bytes(b"content")
         found = await browser.get(wanted)

@@ -10,7 +10,7 @@ import pytest
 
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.commandline.look import small_talk
-from engage_hri.services.perception.hearing.listening import found
+from engage_hri.services.perception.hearing.listening import Order
 from engage_hri.services.perception.hearing.recognizing import (
     Desk,
     KnownWords,
@@ -26,6 +26,10 @@ from engage_hri.services.perception.hearing.voice import Samples
 from tests.perception.spoken import PHRASES, VOICES, spoken
 
 OTHER = ("would you like some coffee", "my name is peter", "where is the train station", "happy birthday to you")
+
+
+def found(name: str, settings: RecognizerSettings) -> SpeechRecognizer:
+    return Order(name, settings).made()
 
 
 class Counting(Listening):

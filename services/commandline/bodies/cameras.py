@@ -130,7 +130,7 @@ def _by_seat(config: RobotConfig, source: str, at: Vector) -> "tuple[PlacedCamer
     from engage_hri.services.runtime.packages import data_folder
 
     eyes = msgspec.structs.replace(config.eyes, source=source)
-    order = SourceOrder(source.partition(":")[0], settings_of(eyes, str(data_folder())))
+    order = SourceOrder(source.partition(":")[0], settings_of(eyes, str(data_folder("eyes"))))
     stated, heads, width, focal = StatedCamera(eyes.field_of_view, eyes.place, 0.0, 0.0), [], 0, 0.0
     for landmarks in opened(order, FACES).look():
         width, focal = landmarks.width, stated.focal(landmarks.width)

@@ -1,4 +1,4 @@
-"""Command `engage eyes install`: fetch what eyes need of others from its registries into this user's data folder."""
+"""Commands `engage eyes install`, `engage hearing install`: fetch what senses need of others, for this user."""
 
 import tempfile
 from dataclasses import dataclass
@@ -20,18 +20,18 @@ class Options:
         typer.Option(
             "--from",
             metavar="FOLDER",
-            help=f"Folder in which {' and '.join(each.file for each in PARCELS)} lie, where there is no network.",
+            help="Folder in which the files of the packages lie, where there is no network.",
             show_default=False,
         ),
     ] = None
 
 
-def main(options: Options) -> int:
-    """Install the models, and what runs them in browsers."""
-    for parcel in PARCELS:
+def main(options: Options, sense: str = "eyes") -> int:
+    """Install the models of a sense."""
+    for parcel in PARCELS[sense]:
         with tempfile.TemporaryDirectory() as aside:
             file = download(parcel, Path(aside)) if options.folder is None else options.folder / parcel.file
-            kept = install(parcel, file, data_folder())
+            kept = install(parcel, file, data_folder(sense))
         for path in kept:
             print(path)
         print(f"of {parcel.name} {parcel.version}, under the license {parcel.license}: {parcel.purpose}")

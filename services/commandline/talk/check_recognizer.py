@@ -81,14 +81,14 @@ def main(options: Options) -> int:
             raise InputRefused(Fault(reason=reason, advice=extra_command(extra)))
     import jiwer
 
-    from engage_hri.services.perception.hearing.listening import found
+    from engage_hri.services.perception.hearing.listening import Order
     from engage_hri.services.perception.hearing.recognizing import settings_of
 
     config = options.load().hearing
     files = [*_spoken(options.files)]
     printed = None if options.json else Terminal(highlight=False, file=sys.stdout)
     with redirect_stdout(sys.stderr):  # what an engine prints is no part of the report
-        recognizer = found(options.recognizer, settings_of(config))
+        recognizer = Order(options.recognizer, settings_of(config)).made()
         for each in files:
             _heard(each, recognizer, config)
             each.errors = jiwer.wer(_plain(each.said), _plain(each.understood))

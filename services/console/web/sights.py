@@ -133,12 +133,12 @@ class _Installed(StaticFiles):
     """The files that `engage eyes install` has fetched, as they are now: nobody has to start the window anew."""
 
     def __init__(self) -> None:
-        super().__init__(directory=data_folder(), check_dir=False)
+        super().__init__(directory=data_folder("eyes"), check_dir=False)
         self.config_checked = True  # what is not installed is told below
-        self._names = {name for parcel in PARCELS for name in parcel.names()}
+        self._names = {name for parcel in PARCELS["eyes"] for name in parcel.names()}
 
     async def get_response(self, path: str, scope: Any) -> Response:
-        if path not in self._names or not (data_folder() / path).is_file():
+        if path not in self._names or not (data_folder("eyes") / path).is_file():
             raise HTTPException(404, "run `engage eyes install` where the window runs")
         response = await super().get_response(path, scope)
         response.headers["cache-control"] = "no-cache"

@@ -72,7 +72,7 @@ class _Eyes:
 
     def __init__(self, bus: Bus, config: EyesConfig, inbox: Subscription, people: SeenPeople) -> None:
         self._bus, self._inbox, self._people = bus, inbox, people
-        order = SourceOrder(config.source.partition(":")[0], settings_of(config, str(data_folder())))
+        order = SourceOrder(config.source.partition(":")[0], settings_of(config, str(data_folder("eyes"))))
         is_real = abs(bus.now() - time.monotonic()) < 1.0
         self._watching: Watching = OutsideWatching(order) if is_real else InsideWatching(order)
         self._seeing = Seeing(config)

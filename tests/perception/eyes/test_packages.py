@@ -96,4 +96,4 @@ def test_models_lie_in_the_data_of_this_user(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     monkeypatch.setattr("sys.platform", "linux")
 
-    assert data_folder() == tmp_path / "engage/eyes"
+    assert data_folder("eyes") == tmp_path / "engage/eyes"
