@@ -167,7 +167,8 @@ class Talk(KindRecognizer):
         is_into_words = said is not None and said.since <= at
         is_to_person = said is not None and said.is_to(self.id)
         speech.is_beside = is_into_words and not is_to_person
-        is_in_pause = self.asked_since < inf and self._scene.turn is not None and self.id in self._scene.turn[1]
+        is_asked = self.asked_since < inf or self._conversation.exchange.pair.robot_holds_turn
+        is_in_pause = is_asked and self._scene.turn is not None and self.id in self._scene.turn[1]
         may_be_in_turn = (is_into_words and is_to_person) or is_in_pause
         is_into_turn = may_be_in_turn if self._line else self._conversation.is_into_turn(at)
         is_line = self._scene.lines.get(self.id) == at
