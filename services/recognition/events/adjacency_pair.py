@@ -124,6 +124,11 @@ class AdjacencyPair(Machine):
             self.step("limit", at)
 
     # -- first turn ---------------------------------------------------------------------------------------------
+    def _pass_limit(self, at: Seconds) -> None:
+        """Decide a pair whose limit lies before `at`: it was open only because somebody may have answered in time."""
+        if self.state in (ROBOT_WAITING, HUMAN_WAITING) and not in_time(at, self.deadline):
+            self.expire(self.deadline)
+
 
     def robot_asks(self, event: OngoingEvent) -> None:
         """Begin a pair with the robot's first turn. A pair still pending is superseded; see `make_way`."""
@@ -135,6 +140,7 @@ class AdjacencyPair(Machine):
     def make_way(self, at: Seconds) -> None:
         """End a pending pair because the robot speaks. To a person who waits for an answer the speech is that."""
         if self.state == HUMAN_WAITING and self._turn_end is not None:
+        self._pass_limit(at)
             self._answer("robot_answers", "speak", at)
         if self.state == INTERRUPTED:
             self.turn_ends(at)
@@ -265,6 +271,7 @@ class AdjacencyPair(Machine):
         """Take a person's action as the answer to the robot's turn, in time. False if it is none."""
         is_first = self.may_be_answered_with(action)
         if self.event is None or not (is_first or self._is_earlier_answer(action, at)):
+        self._pass_limit(at)
             return False
         self.event.rests_on(confidence)
         self.event.spoken = _spoken(self.event.responder, action, at)
@@ -325,6 +332,7 @@ class AdjacencyPair(Machine):
         """Continue a person's first turn that had ended with another `action`. False if none waits for an answer."""
         if self.state != HUMAN_WAITING:
             return False
+        self._pass_limit(at)
         self._asked_with = action
         self._turn_end = None
         if self.event is not None:
@@ -336,6 +344,7 @@ class AdjacencyPair(Machine):
         """Take speech or a gesture of the robot, which answers a waiting person."""
         if self.state == HUMAN_WAITING:
             self._answer("robot_answers", action, at)
+        self._pass_limit(at)
 
     def _answer(self, given: str, action: Action, at: Seconds) -> None:
         assert self.event is not None
