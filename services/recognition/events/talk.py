@@ -404,6 +404,8 @@ class Talk(KindRecognizer):
             return since is not None and self._scene.is_contested(self.id, since)
         return self._waits_for_others(since)
 
+        if not isinstance(first, OwnSpeech) and not self._conversation.exchange.pair.may_be_answered:
+            return False  # it says nothing, and ends no question
     @property
     def _undecided(self) -> list[OwnSpeech]:
         speeches = [each for _, each in self._line if isinstance(each, OwnSpeech)]
