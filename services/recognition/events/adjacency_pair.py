@@ -402,6 +402,21 @@ class AdjacencyPair(Machine):
             self._end_response("response_ends", at)
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
+    def take_over(self, other: "AdjacencyPair", person: str, former: str) -> None:
+        """Take what may follow on a pair that is over: a late answer, or a third turn.
+
+        other: pair of the person by another id, `former`. person: the one that is kept.
+        """
+        self.interrupted_until = max(self.interrupted_until, other.interrupted_until)
+        if self.event is not None or other.state != IDLE:
+            return
+        if self._unanswered is None and other._unanswered is not None:
+            self._unanswered, self._turn_end = other._unanswered, other._turn_end
+            self._unanswered.responder = person
+        if other._third_turn_until > self._third_turn_until:
+            self._third_turn_until = other._third_turn_until
+            self._third_turn_of = person if other._third_turn_of == former else other._third_turn_of
+
         self.forget_unanswered()
         if self.state == INTERRUPTED:
             self.turn_ends(at)

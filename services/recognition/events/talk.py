@@ -278,6 +278,8 @@ class Talk(KindRecognizer):
         goes_on: what they say by that id goes on. What both ids have said at one time, two reporters have told.
         """
         self.person_back()
+        before = other._conversation.exchange.pair
+        self._conversation.exchange.pair.take_over(before, self.id, other.id)
         for speech in other.speeches.in_order():
             is_open = other._is_open(speech)
             speech.actor = self.id
