@@ -88,7 +88,7 @@ class Talk(KindRecognizer):
             since.append(pair.interrupted_since)
         if sign is not None and (sign.is_beside or is_asked):
             since += [each.since for each in sign.speeches]
-        return min(since, default=inf) < answered.began - ROUNDING
+        return (min(since, default=inf), not is_asked, self.id) < answered.place
 
     @property
     def is_under_way(self) -> bool:
@@ -404,10 +404,10 @@ class Talk(KindRecognizer):
                 return True  # it is to be told first that this has answered for all
         if since is None or isinstance(first, CutOff):
             return since is not None and self._scene.is_contested(self.id, since)
-        return self._waits_for_others(since)
-
         if not isinstance(first, OwnSpeech) and not self._conversation.exchange.pair.may_be_answered:
             return False  # it says nothing, and ends no question
+        return self._waits_for_others(since)
+
     @property
     def _undecided(self) -> list[OwnSpeech]:
         speeches = [each for _, each in self._line if isinstance(each, OwnSpeech)]
