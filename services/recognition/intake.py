@@ -112,8 +112,6 @@ class Intake:
         self._identities = Identities(robot)
         self._told: Latest[str, ConnectionEvent] = Latest(EVENTS_KEPT)
         """The latest events, each as it was last told, by id. Of people who are joined they are told again."""
-        self._former_until: Seconds = -inf
-        """Time until which a former life has told all events, as far as is known."""
         self._source = ""
         """Who has sent the message that is being taken."""
         self._recognizer = Recognizer(robot, config, clock=clock.name, name=f"{session}-", strict=False)
@@ -171,7 +169,7 @@ class Intake:
         if state.at.clock != self._clock.name or state.at.seconds > now:
             return
         if isinstance(state, SamePeople):  # the last change of it may be long ago: that life went on
-            if max(self._former_until, state.at.seconds) > now - FORGOTTEN_AFTER:
+            if max(self._recognizer.former_until, state.at.seconds) > now - FORGOTTEN_AFTER:
                 self._identities.resume(state.people)
                 for same in state.people:
                     self._recognizer.session.scene.call(self._identities.inside(same.actor), same.actor, same.name)
@@ -182,7 +180,7 @@ class Intake:
         if isinstance(state, ConnectionEvent):
             self._statistics.remember(state)
             return
-        self._former_until = max(self._former_until, state.at.seconds)
+        self._recognizer.former_until = max(self._recognizer.former_until, state.at.seconds)
         if isinstance(state, Statistics):
             self._statistics.resume(state, now)
             if state.head is not None:
@@ -286,8 +284,6 @@ class Intake:
         for observation, at, is_sure in told:
             if not isinstance(observation, GoesOn):
                 self._note_error(observation.actor, observation.at, at, is_sure=is_sure)
-            if isinstance(observation, ActionBegan) and at <= self._former_until:
-                observation = GoesOn(began=observation, since=at)
             self._feed(observation, at)
 
     def _feed(self, observation: Perceived, at: Seconds) -> None:

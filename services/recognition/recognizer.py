@@ -53,6 +53,8 @@ class Recognizer:
         self, robot: str, config: RecognitionConfig, *, clock: str = "loop", name: str = "", strict: bool = True
     ) -> None:
         self.session = Session(robot, config, clock=clock, name=name, strict=strict)
+        self.former_until: Seconds = -math.inf
+        """Time until which a former life has told all events, as far as is known."""
         self._strict = strict
         self._config = config
         self._new_attention = partial(Attention, robot, config, clock)
@@ -229,6 +231,8 @@ class Recognizer:
         return [*results, *mishaps]
 
     def _wait(self, observation: Observation | Covered, at: Seconds) -> None:
+        if isinstance(observation, ActionBegan) and at <= self.former_until:
+            observation = GoesOn(began=observation, since=at)
         match observation:
             case RequestEvent() | SignalTurn():
                 self.session.announce(observation)

@@ -9,7 +9,7 @@ from msgspec.structs import astuple
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import EVENT_KINDS, Cause, Event, TurnSignal
-from engage_hri.schemas.perception import ActionBegan, ActionEnded
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, Utterance
 from engage_hri.schemas.recognition import (
     ConnectionEvent,
     EventState,
@@ -121,6 +121,25 @@ async def test_what_the_bus_remembers_is_not_counted_again(hub: MemoryHub, tmp_p
             await answer(bus)
         async with running(hub, recognition(memory=memory)):
             after = await last(bus, HUMAN)
+
+    assert pairs(after) == (1, 1, 0)
+
+
+async def test_words_that_the_bus_remembers_are_no_second_question(hub: MemoryHub, tmp_path: Path) -> None:
+    """Nothing but the words told of it: somebody typed a line, which the robot answered before it was killed."""
+    memory, bus = str(tmp_path / "recognition.json"), hub.join("perception")
+    body = hub.join("control")
+    async with running(hub, recognition(memory=memory)):
+        bus.publish(keys.WORLD, world())
+        at = bus.stamp()
+        bus.publish(keys.UTTERANCE, Utterance(actor=HUMAN, id="line", text="which one?", began=at, ended=at, at=at))
+        await asyncio.sleep(0.2)
+        for kind in (ActionBegan, ActionEnded):
+            body.publish(keys.ROBOT_ACTION, kind(actor=ROBOT, action="speak", at=body.stamp(), behavior="b:s"))
+            await asyncio.sleep(0.5)
+        hub.kill("recognition")
+    async with running(hub, recognition(memory=memory)):
+        after = await last(bus, HUMAN)
 
     assert pairs(after) == (1, 1, 0)
 

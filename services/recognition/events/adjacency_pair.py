@@ -78,7 +78,6 @@ class AdjacencyPair(Machine):
         self._asked_with: Action = "speak"
         self._turn_end: Seconds | None = None
         self._last_heard: Seconds | None = None
-        self._response_since: Seconds = 0.0
         self._response_until: Seconds | None = None
         self._third_turn_of = ""
         self._third_turn_until: Seconds = 0.0
@@ -101,7 +100,9 @@ class AdjacencyPair(Machine):
     @property
     def interrupted_since(self) -> Seconds:
         """Start of the answer to the robot's first turn, which goes on; infinite: there is none."""
-        return self._response_since if self.state == INTERRUPTED and self._by_robot else inf
+        if self.event is None or self.state != INTERRUPTED or not self._by_robot:
+            return inf
+        return self.event.response_since
 
     @property
     def deadline(self) -> Seconds:
@@ -123,6 +124,11 @@ class AdjacencyPair(Machine):
             self._unanswered = self.event if self._by_robot and self._forgotten_at < at else None
             self.step("limit", at)
 
+    def _pass_limit(self, at: Seconds) -> None:
+        """Decide a pair whose limit lies before `at`: it was open only because somebody may have answered in time."""
+        if self.state in (ROBOT_WAITING, HUMAN_WAITING) and not in_time(at, self.deadline):
+            self.expire(self.deadline)
+
     # -- first turn ---------------------------------------------------------------------------------------------
 
     def robot_asks(self, event: OngoingEvent) -> None:
@@ -134,6 +140,7 @@ class AdjacencyPair(Machine):
 
     def make_way(self, at: Seconds) -> None:
         """End a pending pair because the robot speaks. To a person who waits for an answer the speech is that."""
+        self._pass_limit(at)
         if self.state == HUMAN_WAITING and self._turn_end is not None:
             self._answer("robot_answers", "speak", at)
         if self.state == INTERRUPTED:
@@ -196,7 +203,7 @@ class AdjacencyPair(Machine):
             if self._by_robot:
                 self.interrupted_until = at
             self._turn_end = at
-            self.event.delay = self._response_since - at
+            self.event.delay = self.event.response_since - at
             self.step("turn_ends", at)
             if self._response_until is not None:
                 self._end_response("response_ends", at)
@@ -232,7 +239,7 @@ class AdjacencyPair(Machine):
         """Take the answer of somebody who was not asked: it is no failure of who was."""
         if self.event is not None and self.question is not None:
             self.event.response, self.event.answered_by = action, person
-            self.event.delay = at - self.question.since
+            self.event.delay, self.event.response_since = at - self.question.since, at
             self.event.spoken = _spoken(person, action, at)
             self.step("other_answers", at)
 
@@ -242,6 +249,7 @@ class AdjacencyPair(Machine):
         if event is None or event is answered or not self.is_turn(answered.turn) or self.state != ROBOT_WAITING:
             return
         event.response, event.answered_by, event.delay = answered.response, answered.answered_by, answered.delay
+        event.response_since = answered.response_since
         event.spoken = answered.spoken
         is_asked = answered.answered_by == answered.responder
         self.step("one_of_several_answers" if is_asked else "other_answers", at)
@@ -263,6 +271,7 @@ class AdjacencyPair(Machine):
 
     def human_begins(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> bool:
         """Take a person's action as the answer to the robot's turn, in time. False if it is none."""
+        self._pass_limit(at)
         is_first = self.may_be_answered_with(action)
         if self.event is None or not (is_first or self._is_earlier_answer(action, at)):
             return False
@@ -271,7 +280,7 @@ class AdjacencyPair(Machine):
         if is_first:
             self._answer("human_answers", action, at)
         else:
-            self.event.response, self._response_since, self._response_until = action, at, None
+            self.event.response, self.event.response_since, self._response_until = action, at, None
         return True
 
     def is_answered_in(self, speeches: Iterable[Seconds]) -> None:
@@ -306,7 +315,7 @@ class AdjacencyPair(Machine):
         """True if the action, known only now, began before the one that has been taken for the answer so far."""
         if self.event is None or self.state != INTERRUPTED or not self._by_robot:
             return False
-        return at < self._response_since and action in self.event.accept
+        return at < self.event.response_since and action in self.event.accept
 
     def was_listening(self, since: Seconds) -> bool:
         """Wait on: the words of this speech, taken for the answer during the robot's turn, are a listener's.
@@ -315,7 +324,7 @@ class AdjacencyPair(Machine):
         """
         if self.event is None or self.state != INTERRUPTED or not self._by_robot:
             return False
-        if (self.event.response, self._response_since) != ("speak", since):
+        if (self.event.response, self.event.response_since) != ("speak", since):
             return False
         self.event.response, self.event.spoken = None, ()
         self.step("was_listening", since)
@@ -323,6 +332,7 @@ class AdjacencyPair(Machine):
 
     def human_goes_on(self, action: Action, at: Seconds) -> bool:
         """Continue a person's first turn that had ended with another `action`. False if none waits for an answer."""
+        self._pass_limit(at)
         if self.state != HUMAN_WAITING:
             return False
         self._asked_with = action
@@ -334,13 +344,13 @@ class AdjacencyPair(Machine):
 
     def robot_begins(self, action: Action, at: Seconds) -> None:
         """Take speech or a gesture of the robot, which answers a waiting person."""
+        self._pass_limit(at)
         if self.state == HUMAN_WAITING:
             self._answer("robot_answers", action, at)
 
     def _answer(self, given: str, action: Action, at: Seconds) -> None:
         assert self.event is not None
-        self.event.response = action
-        self._response_since = at
+        self.event.response, self.event.response_since = action, at
         if self._turn_end is None:
             self.step("responder_interrupts", at)
         else:
@@ -363,7 +373,7 @@ class AdjacencyPair(Machine):
         assert self.event is not None
         end = self._response_until if until is None else until
         end = at if end is None else end
-        self.event.duration = max(0.0, end - self._response_since)
+        self.event.duration = max(0.0, end - self.event.response_since)
         self._third_turn_of = self.event.initiator
         self._third_turn_until = end + self._third_turn
         self.step(given, at)
@@ -391,6 +401,21 @@ class AdjacencyPair(Machine):
         """End an answer of the robot without words, for the fragment that gave it is over."""
         if self.state == RESPONDING and not self._by_robot:
             self._end_response("response_ends", at)
+
+    def take_over(self, other: "AdjacencyPair", person: str, former: str) -> None:
+        """Take what may follow on a pair that is over: a late answer, or a third turn.
+
+        other: pair of the person by another id, `former`. person: the one that is kept.
+        """
+        self.interrupted_until = max(self.interrupted_until, other.interrupted_until)
+        if self.event is not None or other.state != IDLE:
+            return
+        if self._unanswered is None and other._unanswered is not None:
+            self._unanswered, self._turn_end = other._unanswered, other._turn_end
+            self._unanswered.responder = person
+        if other._third_turn_until > self._third_turn_until:
+            self._third_turn_until = other._third_turn_until
+            self._third_turn_of = person if other._third_turn_of == former else other._third_turn_of
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         self.forget_unanswered()

@@ -107,6 +107,7 @@ class OngoingEvent(Struct, kw_only=True):
     delay: Seconds | None = None
     duration: Seconds | None = None
     response: Action | None = None
+    response_since: Seconds = 0.0
     answered_by: str = ""
     is_to_several: bool = False
     """Adjacency pair: the robot has asked others in the same turn, and whoever answers first answers for all."""
@@ -131,8 +132,13 @@ class Answered(NamedTuple):
 
     @property
     def began(self) -> Seconds:
-        """Time when the answer began: into the turn, or as it was decided."""
-        return self.at + min(0.0, self.event.delay or 0.0)
+        """Time when the answer began."""
+        return self.event.response_since
+
+    @property
+    def place(self) -> tuple[Seconds, bool, str]:
+        """Place of the answer among all; see `SessionScene.place`."""
+        return self.began, self.event.answered_by != self.event.responder, self.event.answered_by
 
 
 class EventWriter:

@@ -204,7 +204,7 @@ class People:
                 self._apply(self.persons[taken_up.asked], at, partial(_answered_by_other, taken_up))
         while answered := self._writer.answered:
             # The end of a turn decides several answers in one instant: the first is that of who was silent.
-            first = min(range(len(answered)), key=lambda n: answered[n].event.delay or 0.0)
+            first = min(range(len(answered)), key=lambda n: answered[n].place)
             if any(person.talk.may_answer_before(answered[first]) for person in self.persons.values()):
                 return
             told = partial(_answered_for_all, *answered.pop(first))

@@ -88,7 +88,7 @@ class Talk(KindRecognizer):
             since.append(pair.interrupted_since)
         if sign is not None and (sign.is_beside or is_asked):
             since += [each.since for each in sign.speeches]
-        return min(since, default=inf) < answered.began - ROUNDING
+        return (min(since, default=inf), not is_asked, self.id) < answered.place
 
     @property
     def is_under_way(self) -> bool:
@@ -279,6 +279,8 @@ class Talk(KindRecognizer):
         goes_on: what they say by that id goes on. What both ids have said at one time, two reporters have told.
         """
         self.person_back()
+        before = other._conversation.exchange.pair
+        self._conversation.exchange.pair.take_over(before, self.id, other.id)
         for speech in other.speeches.in_order():
             is_open = other._is_open(speech)
             speech.actor = self.id
@@ -403,6 +405,8 @@ class Talk(KindRecognizer):
                 return True  # it is to be told first that this has answered for all
         if since is None or isinstance(first, CutOff):
             return since is not None and self._scene.is_contested(self.id, since)
+        if not isinstance(first, OwnSpeech) and not self._conversation.exchange.pair.may_be_answered:
+            return False  # it says nothing, and ends no question
         return self._waits_for_others(since)
 
     @property
