@@ -61,7 +61,7 @@ class Listener:
         if self.sign is not None and self.sign.until is not None:
             self.judge(self.sign.until)
         if self.sign is not None and self.sign.until is not None:
-            self._listens(self.sign, self.sign.until)
+            self._has_no_words(self.sign, self.sign.until)
 
     def _joins(self, part: SignPart, *, beside: bool = False) -> None:
         if self.sign is None:
@@ -96,6 +96,8 @@ class Listener:
             self.judge(at)
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
+        if self.sign is not None and self.sign.outlasting is not None:
+            self._takes_floor(self.sign.outlasting, until, "answer")
         sign, self.sign = self.sign, None
         if sign is not None and not sign.speeches:
             self._listens(sign, until)
@@ -139,19 +141,38 @@ class Listener:
         is_known = not self._scene.is_worded or sign.is_wordless or is_heard
         if interrupts is not None:
             self._takes_floor(interrupts, at, "interruption")
-        elif sign.until is not None and is_known:
+        elif is_known:
+            self._has_no_words(sign, at)
+
+    def _has_no_words(self, sign: ListenerSign, at: Seconds) -> None:
+        """Decide a sign of which no words say anything, unless it goes on in the robot's turn."""
+        if sign.outlasting is not None:
+            self._takes_floor(sign.outlasting, at, "answer")
+        elif sign.until is not None:
             self._listens(sign, sign.until)
 
     def robots_turn_ends(self, at: Seconds, reading: InterjectionReading = "answer") -> None:
         """Take what goes on of the sign for the answer, because the robot's turn is over.
 
-        Of several parts it is the one that began first. A gesture that answers nothing here stays what it is.
+        Of several parts it is the one that began first. A gesture that answers nothing here stays what it is, and one
+        beside a speech whose words may come waits for them: that began before.
         """
-        for part in self.sign.going_on() if self.sign is not None else ():
+        sign = self.sign
+        for part in sign.going_on() if sign is not None else ():
             is_speech = part.action == "speak"
             if not self._is_echo(part) if is_speech else self._exchange.pair.may_be_answered_with(part.action):
-                self._takes_floor(part, at, reading)
+                is_gesture_of_answer = reading == "answer" and not is_speech
+                if sign is not None and is_gesture_of_answer and self._awaits_words_before(sign, part):
+                    sign.outlasting = part
+                else:
+                    self._takes_floor(part, at, reading)
                 return
+
+    def _awaits_words_before(self, sign: ListenerSign, part: SignPart) -> bool:
+        """True if words may come of a speech of the sign that began before a part of it."""
+        if not self._scene.is_worded or sign.is_wordless:
+            return False
+        return any(each.since < part.since and not self._asks_for_nothing(each) for each in sign.speeches)
 
     def understand(self, speech: SignPart, at: Seconds, *, in_turn: bool, is_last: bool) -> None:
         """Judge a speech by its words.

@@ -45,11 +45,14 @@ class ListenerSign(Struct):
     """All that a listener does at one time, in the order in which it began.
 
     is_wordless: the words of its speech have not come in time. is_beside: the robot speaks to others.
+    outlasting: a gesture with which the person has gone on when the robot's turn was over, while the words of what was
+    said with it may come: it is the answer, unless these are.
     """
 
     parts: list[SignPart]
     is_wordless: bool = False
     is_beside: bool = False
+    outlasting: SignPart | None = None
 
     @property
     def since(self) -> Seconds:

@@ -238,6 +238,8 @@ class Talk(KindRecognizer):
         """Take the words of a speech in their turn; if they decide nothing they are told all the same."""
         talk.understand(speech.part, at)
         self._writer.interject_again(self.id, speech.since, at)
+        if speech.is_noise and speech.is_heard and says_words(speech.words):
+            self.speeches.has_words_after_all(speech)
 
     def _has_news(self, speech: OwnSpeech, at: Seconds) -> None:
         """Take news of a speech of which nothing is told yet: it may be for others than it seemed, and no noise."""
