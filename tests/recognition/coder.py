@@ -265,13 +265,17 @@ class Coder:
         """True if a gesture is for the robot: of who was not asked it is only if the head says so."""
         looks = [each for each in self._timeline.spans if each.who == sign.who and each.action == "look"]
         is_seen = any(each.since < sign.since < each.until and each.to == ROBOT for each in looks)
-        return is_seen or side.asked is not None or len(self._sides) == 1
+        is_asked = side.asked is not None and sign.since[0] <= side.asked.until[0] + self._limit + ROUND
+        return is_seen or is_asked or len(self._sides) == 1
 
     def _is_last(self, speech: Span) -> bool:
         """True if words come of a speech, and neither the person nor the robot to them has spoken before they do."""
         if speech.known is None:
             return False
-        own = [each.since for each in self._timeline.spans if _speaks_to_robot(each, speech.who)]
+        own = [
+            each.since for each in self._timeline.spans
+            if _speaks_to_robot(each, speech.who) and speech.since < each.since and not self._is_noise(each)
+        ]  # fmt: skip
         robots = [since for turn in self._timeline.turns if speech.who in turn.to for since, _ in turn.speech]
         return not any(speech.since < since < speech.known for since in (*own, *robots))
 

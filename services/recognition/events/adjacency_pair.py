@@ -84,6 +84,7 @@ class AdjacencyPair(Machine):
         self._unanswered: OngoingEvent | None = None
         """The robot's last pair, if its limit passed without an answer and nobody has begun a turn since."""
         self._forgotten_at: Seconds = NEVER
+        """When the robot has first said something after that limit; until then, when it has last done so."""
         self.interrupted_until: Seconds = NEVER
         """End of the robot's last turn that was answered before it ended: all said in it is part of that answer."""
 
@@ -121,7 +122,9 @@ class AdjacencyPair(Machine):
         elif self._turn_end is None:
             self.step("withdraw", at)
         else:
-            self._unanswered = self.event if self._by_robot and self._forgotten_at < at else None
+            self._unanswered = self.event if self._by_robot else None
+            if self._forgotten_at < at:
+                self._forgotten_at = inf
             self.step("limit", at)
 
     def _pass_limit(self, at: Seconds) -> None:
@@ -295,7 +298,7 @@ class AdjacencyPair(Machine):
         Otherwise a slow person would fail twice: by not answering, and by a question that nobody has asked.
         """
         event = self._unanswered
-        if event is None or self._turn_end is None or action not in event.accept:
+        if event is None or self._turn_end is None or action not in event.accept or at > self._forgotten_at:
             return False
         self.forget_unanswered()
         event.rests_on(confidence)
@@ -304,12 +307,17 @@ class AdjacencyPair(Machine):
         self._writer.publish(event, "failed", at, retold=True)
         return True
 
-    def forget_unanswered(self, at: Seconds = NEVER) -> None:
-        """Begin another turn: from now on nothing answers the robot's turn before, however late.
+    def forget_unanswered(self) -> None:
+        """Begin another turn: from now on nothing answers the robot's turn before, however late."""
+        self._unanswered = None
 
-        at: when the robot says something to somebody else. That what failed before has failed may be known later.
+    def robot_says(self, at: Seconds) -> None:
+        """Note that the robot says something, to whomever: nothing that begins later answers what has failed before.
+
+        That it has failed, and what was said before, may be known later.
         """
-        self._unanswered, self._forgotten_at = None, max(at, self._forgotten_at)
+        if self._unanswered is None or at < self._forgotten_at:
+            self._forgotten_at = at
 
     def _is_earlier_answer(self, action: Action, at: Seconds) -> bool:
         """True if the action, known only now, began before the one that has been taken for the answer so far."""

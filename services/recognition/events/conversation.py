@@ -17,7 +17,6 @@ from engage_hri.services.recognition.events.limits import in_time
 from engage_hri.services.recognition.events.listener import Listener
 from engage_hri.services.recognition.events.listener_sign import SignPart
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent
-from engage_hri.services.recognition.events.presence import NEVER
 from engage_hri.services.recognition.events.scene import SessionScene
 
 
@@ -33,8 +32,6 @@ class Dialogue:
         """Time when the robot began what it says to this person now; None: it says nothing to them."""
         self._speech: SignPart | None = None
         """What the person says now."""
-        self._turned_at: Seconds = NEVER
-        """Time when the person, or the robot to the person, has last begun to say something."""
         self._scene = scene
         self._config = config
         self._writer = writer
@@ -92,10 +89,6 @@ class Dialogue:
         is_open = self.exchange.is_open or self.listener.sign is not None or self.robot_backchannel.event is not None
         return is_open or self._speech is not None or self.robot_speaks_since is not None
 
-    def _is_last(self, since: Seconds) -> bool:
-        """True if neither has begun to say anything since the person has begun to say this."""
-        return self._turned_at <= since and (self._speech is None or self._speech.since == since)
-
     # -- the person ---------------------------------------------------------------------------------------------
 
     def speaks(self, speech: SignPart, *, beside: bool = False) -> None:
@@ -107,7 +100,6 @@ class Dialogue:
             self._writer.interject(self.id, at, "open", at)
             # A line that was typed has no length by which it could be judged: who sends one has something to say.
             if self._scene.lines.get(self.id) != at:
-                self._turned_at = at
                 self.listener.begins(speech, beside=not self.robot_holds_floor)
                 return
             self._writer.interject(self.id, at, "interruption", at)
@@ -120,7 +112,6 @@ class Dialogue:
                 self.exchange.pair.robot_begins(
                     "speak", self.robot_speaks_since
                 )  # what the robot says now is the answer
-        self._turned_at = at
 
     def falls_silent(self, at: Seconds) -> None:
         if self._speech is None:
@@ -156,7 +147,8 @@ class Dialogue:
     def understand(self, speech: SignPart, at: Seconds) -> None:
         """Judge what was said as a sign by its words, whenever they come."""
         since = speech.since
-        self.listener.understand(speech, at, in_turn=self.is_into_turn(since), is_last=self._is_last(since))
+        in_turn, is_last = self.is_into_turn(since), self._scene.is_last(self.id, since, at)
+        self.listener.understand(speech, at, in_turn=in_turn, is_last=is_last)
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         self.exchange.person_gone(at, until)
@@ -168,7 +160,7 @@ class Dialogue:
 
     def robot_speaks(self, at: Seconds, *, listens: bool) -> None:
         """Take the beginning of the robot's speech. listens: it is a backchannel that was announced."""
-        self.robot_speaks_since = self._turned_at = at
+        self.robot_speaks_since = at
         self.exchange.pair.robot_heard(None)
         if self._speech is not None and not self.exchange.pair.robot_holds_turn:
             if self.robot_backchannel.state != BRIEF and not self.exchange.pair.is_cut_into:
@@ -210,7 +202,6 @@ class Dialogue:
         self.exchange.ends(action, at, by_robot=True)
 
     def robot_asks(self, event: OngoingEvent) -> None:
-        self._turned_at = event.started
         self._drop_robots_sign(event.started)
         self.exchange.robot_asks(event)
         if self.robot_speaks_since is not None:

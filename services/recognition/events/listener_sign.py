@@ -50,8 +50,8 @@ class ListenerSign(Struct):
     """All that a listener does at one time, in the order in which it began.
 
     is_wordless: the words of its speech have not come in time. is_beside: the robot speaks to others.
-    outlasting: a gesture with which the person has gone on when the robot's turn was over, while the words of what was
-    said with it may come: it is the answer, unless these are.
+    outlasting: a gesture with which the person has gone on when the robot's turn was over, while words of what was
+    said before it may come: it is the answer, unless these are.
     """
 
     parts: list[SignPart]

@@ -274,9 +274,12 @@ class SessionScene:
         """The speech that began then; None: it is not known to whom it was, or long ago."""
         return next((each for each in self.spoken if each.actor == actor and each.since == since), None)
 
-    def is_last(self, person: str, since: Seconds) -> bool:
-        """True if neither the person nor the robot has begun to say something to the other since."""
-        said = [each for each in self.spoken if each.since > since and not (each.is_noise or each.may_be_noise)]
+    def is_last(self, person: str, since: Seconds, until: Seconds = inf) -> bool:
+        """True if neither the person nor the robot has begun to say something to the other since, until then."""
+        said = [
+            each for each in self.spoken
+            if since < each.since < until and not (each.is_noise or each.may_be_noise)
+        ]  # fmt: skip
         robot = self.robot
         return not any(
             each.is_to(robot) if each.actor == person else each.actor == robot and each.is_to(person) for each in said

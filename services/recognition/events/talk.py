@@ -361,7 +361,7 @@ class Talk(KindRecognizer):
 
     def robot_begins(self, began: ActionBegan, at: Seconds) -> None:
         if began.action == "speak" and not self._scene.is_listening(began.behavior):
-            self.take(at, lambda talk: talk.exchange.pair.forget_unanswered(at))
+            self.take(at, lambda talk: talk.exchange.pair.robot_says(at))
 
     def robot_stops(self, action: Action, at: Seconds) -> None:
         if not self.is_under_way:
