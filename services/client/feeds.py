@@ -5,6 +5,8 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from typing import TypeVar
 
+from msgspec.structs import replace
+
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, NoReply
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
@@ -48,21 +50,6 @@ class Feed(Reading[M]):
     def close(self) -> None:
         """End the feed: nothing more comes, and a task that waits in `next` gets None."""
         self._subscription.close()
-
-
-class LevelFeed(Feed[Statistics]):
-    """Statistics of people, each only if its level is another than that told before."""
-
-    def __init__(self, subscription: Subscription, now: Callable[[], Seconds]) -> None:
-        super().__init__(subscription, (Statistics,), now)
-        self._levels: dict[str, str] = {}
-
-    def _is_wanted(self, received: Received) -> bool:
-        told = received.message
-        if not isinstance(told, Statistics) or not told.actor or self._levels.get(told.actor) == told.level:
-            return False
-        self._levels[told.actor] = told.level
-        return True
 
 
 async def first_of(
@@ -161,6 +148,39 @@ class EventFeed(DerivedFeed[ConnectionEvent]):
 
     def _passed(self) -> Iterable[ConnectionEvent]:
         return self._stream.expire(self._now())
+
+
+class LevelFeed(DerivedFeed[Statistics]):
+    """Statistics of people, each only if its level is another than that told before.
+
+    An id that turns out to be another one's is told once more, as `unknown`: nothing comes under it any more.
+    """
+
+    def __init__(self, bus: Bus) -> None:
+        super().__init__(bus, (keys.ANY_STATISTICS, keys.SAME_PEOPLE))
+        self._names = PeopleNames()
+        self._last: dict[str, Statistics] = {}
+
+    @property
+    def _due(self) -> None:
+        return None
+
+    def _taken(self, received: Received) -> Iterable[Statistics]:
+        message = received.message
+        news: list[Statistics] = []
+        if isinstance(message, Statistics):
+            last = self._last.get(message.actor)
+            if message.actor and (last is None or last.level != message.level):
+                news.append(message)
+        elif self._names.take(message):
+            for id, last in self._last.items():
+                if (name := self._names.name(id)) != id and last.level != "unknown":
+                    news.append(replace(last, engagement=None, level="unknown", reasons=(f"this is {name}",)))
+        self._last |= {each.actor: each for each in news}
+        return news
+
+    def _passed(self) -> Iterable[Statistics]:
+        return ()
 
 
 SAME_PATIENCE: Seconds = 0.2

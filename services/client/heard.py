@@ -6,7 +6,9 @@
         print(turn.who, "to", turn.to, "has said", turn.text)
 
 A turn begins with a person's voice, or with words that nobody heard a voice for. When it is over is decided by
-turn_ends.py. Words are waited for as long as they may come: a recognizer knows them up to 2 s after the voice.
+turn_ends.py. Words are waited for as long as they may come: a recognizer knows them up to 2 s after the voice. To
+whom they are is mostly decided by recognition with them, and told a moment later: who did not wait for that would
+answer what people say to each other.
 No task runs here: whoever waits takes in what has come, for all that wait.
 """
 
@@ -27,6 +29,11 @@ from engage_hri.services.reports.same_people import PeopleNames
 
 WORDS_PATIENCE: Seconds = 2.0
 """Time after the voice for which a turn waits for words that are on their way, as generation does (decision 0065)."""
+ADDRESSEES_PATIENCE: Seconds = 0.2
+"""Time after the last words for which a turn waits until it is known to whom it is: the way of the words to
+recognition, and of its `Floor` to here. Ours."""
+APART: Seconds = 0.05
+"""Time by which two processes may differ about when a speech begins or ends."""
 RESUMED_WITHIN: Seconds = 1.0
 """A turn that begins so soon after the person's last one was a part of that: its end had been decided too early."""
 KNOWN = 256
@@ -48,6 +55,9 @@ class HeardTurn:
         self._addressed: tuple[str, ...] = ()
         self._reading: InterjectionReading | None = None
         self._speaks = False
+        self._is_line = False
+        self._understood: Seconds = began
+        """When its last words came."""
         self._spoken: Seconds = 0.0
         self._since: Seconds = began
         """When the voice that is heard began."""
@@ -210,6 +220,8 @@ class HeardFeed(Reading[HeardTurn]):
     def _act(self, event: Message, at: Seconds) -> None:
         match event:
             case ActionBegan(actor=who, action="speak") if who != self._bus.robot and at >= self._from:
+                if self._was_over(who, at):
+                    return  # recognition tells of words alone, as a typed line, that they were speech
                 turn = self._turn(who, at)
                 if not turn._speaks:
                     if turn._spoken:
@@ -236,12 +248,12 @@ class HeardFeed(Reading[HeardTurn]):
                 for speech in (*ended, *speeches):
                     turn = self._open.get(self._names.name(speech.actor))
                     since = self._instant(speech.since)
-                    if turn is not None and speech.to and since >= turn.began - 0.05:
+                    if turn is not None and speech.to and since >= turn.began - APART:
                         turn._addressed = speech.to
             case Interjection(actor=actor, reading=reading, since=since):
                 who = self._names.name(actor)
                 for turn in filter(None, (self._open.get(who), self._last.get(who))):
-                    if turn.began - 0.05 <= self._instant(since) <= turn.ended + 0.05 or turn._speaks:
+                    if turn.began - APART <= self._instant(since) <= turn.ended + APART or turn._speaks:
                         turn._reading = reading
                         break
 
@@ -257,13 +269,12 @@ class HeardFeed(Reading[HeardTurn]):
         known = turn._utterances.get(utterance.id)
         if known is not None and (known.final, known.at.seconds) >= (utterance.final, utterance.at.seconds):
             return
-        turn._utterances[utterance.id] = utterance
+        turn._utterances[utterance.id], turn._understood = utterance, at
         if utterance.final:
             turn.ended = max(turn.ended, self._instant(utterance.ended or utterance.at))
         elif known is not None and not turn._speaks and utterance.text != known.text:
             turn.ended = max(turn.ended, at)  # without a voice the words that grow are one
-        if utterance.final and utterance.began == utterance.at and not turn._spoken and not turn._speaks:
-            self._end(turn)  # a line that was typed
+        turn._is_line = utterance.final and utterance.began == utterance.at and not turn._spoken and not turn._speaks
 
     def _turn(self, who: str, at: Seconds) -> HeardTurn:
         """The turn of a person that goes on, or a new one."""
@@ -275,12 +286,20 @@ class HeardFeed(Reading[HeardTurn]):
                 self._habits.note(who, at - last.ended)
         return turn
 
+    def _was_over(self, who: str, at: Seconds) -> bool:
+        """True if a turn of the person that is over has that time."""
+        last = self._last.get(who)
+        return who not in self._open and last is not None and last.began - APART <= at <= last.ended + APART
+
     # -- its end ------------------------------------------------------------------------------------------------
 
     def _end_of(self, turn: HeardTurn) -> Seconds:
         """Time at which the turn is over, if nothing more comes."""
         if turn._speaks:
             return inf
+        addressed = turn.began if turn.to else turn._understood + ADDRESSEES_PATIENCE
+        if turn._is_line:
+            return max(turn.ended, addressed)
         is_waited_for = any(not each.final for each in turn._utterances.values()) or (
             turn._reading == "open" or (not turn._utterances and turn.who in self._worded)
         )
@@ -294,7 +313,7 @@ class HeardFeed(Reading[HeardTurn]):
             pauses=self._habits.of(turn.who),
         )
         silence = self._ends.silence(so_far)
-        return turn.ended + (max(silence, WORDS_PATIENCE) if is_waited_for else silence)
+        return max(turn.ended + (max(silence, WORDS_PATIENCE) if is_waited_for else silence), addressed)
 
     def _end(self, turn: HeardTurn) -> None:
         turn._is_over, turn._speaks = True, False

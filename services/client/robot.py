@@ -197,10 +197,10 @@ class Robot(PerformingRobot):
         """Follow the engagement of people: the level of each as it is now, and whenever it is another.
 
         `level` says it in a word, `engagement` as a number, `reasons` why. Who comes is `engaging`, who drifts away
-        `disengaging`.
+        `disengaging`; an id that turns out to be somebody else's is `unknown`.
         """
         self._requests.check()
-        return LevelFeed(self._bus.subscribe(keys.ANY_STATISTICS), self.now)
+        return LevelFeed(self._bus)
 
     def floor(self) -> Feed[Floor]:
         """Follow who speaks, and to whom: now, and at every change."""

@@ -3,6 +3,7 @@
 import asyncio
 from itertools import pairwise
 
+from engage_hri import embedded, perceive
 from engage_hri.schemas import keys
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound
 from engage_hri.schemas.recognition import Floor, Interjection, Statistics
@@ -74,3 +75,27 @@ def test_each_level_is_told_once_and_the_floor_with_its_addressees() -> None:
     # To whom ben speaks is known when he has ended.
     assert [[(speech.actor, speech.to) for speech in each.speeches] for each in floors] == [[("ben", ())], []]
     assert interjections == [], "the robot has said nothing"
+
+
+async def test_an_id_that_turns_out_to_be_somebody_elses_has_no_level_any_more() -> None:
+    async with (
+        embedded(human="none") as robot,
+        perceive("ann", hub=robot.hub) as ann,
+        perceive("face_3", hub=robot.hub) as face,
+    ):
+        with robot.engagement() as engagement:
+            await ann.look_at(ann.robot)
+            await face.look_at(face.robot)
+            await asyncio.sleep(4.0)
+            face.same_as("ann")
+            await asyncio.sleep(2.0)
+            face.same_as("face_3")
+            await face.look_at(face.robot)
+            await asyncio.sleep(2.0)
+            told: dict[str, list[str]] = {"ann": [], "face_3": []}
+            while (each := await engagement.next(0.0)) is not None:
+                told[each.actor].append(each.level)
+
+    assert told["ann"] == ["engaging", "engaged"]
+    assert told["face_3"][:3] == ["engaging", "engaged", "unknown"]
+    assert "engaging" in told["face_3"][3:]

@@ -7,7 +7,7 @@ from contextlib import asynccontextmanager
 import pytest
 
 from engage_hri import InputRefused, PerceivedPerson, embedded, perceive
-from engage_hri.services.client.heard import HeardTurn
+from engage_hri.services.client.heard import ADDRESSEES_PATIENCE, HeardTurn
 from engage_hri.services.client.turn_ends import (
     COMPLETE,
     LONGEST,
@@ -140,6 +140,7 @@ async def test_a_typed_line_is_over_at_once_and_who_leaves_has_ended() -> None:
             at = robot.now()
             text = await typed.over()
             took = robot.now() - at
+            assert await heard.next(5.0) is None  # that it was speech, as recognition tells, is no turn of its own
             ann.begin("speak")
             voice = await heard.next(1.0)
             assert voice is not None
@@ -147,6 +148,39 @@ async def test_a_typed_line_is_over_at_once_and_who_leaves_has_ended() -> None:
             assert await voice.over() == ""
 
     assert (text, took) == ("stop", pytest.approx(0.0, abs=0.01))
+    assert typed.to == (robot.id,)
+
+
+@pytest.mark.parametrize("delay", [0.3, 0.8, 1.5])
+@pytest.mark.parametrize("at_robot", [False, True])
+async def test_a_turn_says_to_whom_it_was_however_late_its_words_come(delay: float, at_robot: bool) -> None:
+    async with with_ann() as (robot, ann), perceive("ben", hub=robot.hub) as ben:
+        with robot.heard() as heard:
+            await asyncio.sleep(1.0)
+            await ann.look_at(ann.robot if at_robot else ben.id)
+            saying = asyncio.create_task(ann.say("It was colder than last year.", delay=delay))
+            turn = await heard.next(2.0)
+            assert turn is not None
+            await turn.over()
+            await saying
+
+    assert turn.to == (ann.robot if at_robot else ben.id,)
+
+
+async def test_a_turn_of_which_nobody_knows_to_whom_it_is_is_over_soon_after_its_words() -> None:
+    async with with_ann() as (robot, ann), perceive("ben", hub=robot.hub):
+        with robot.heard() as heard:
+            await ann.look_away()
+            await asyncio.sleep(1.0)
+            await ann.say("It was colder than last year.", delay=0.8)
+            at = robot.now()
+            turn = await heard.next(0.0)
+            assert turn is not None
+            await turn.over()
+            took = robot.now() - at
+
+    assert turn.to == ()
+    assert took == pytest.approx(ADDRESSEES_PATIENCE, abs=0.01)
 
 
 async def test_what_is_said_into_a_turn_of_the_robot_says_what_it_is() -> None:

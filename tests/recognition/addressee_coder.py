@@ -33,7 +33,8 @@ def addressee(speech: Span, before: Timeline) -> str:
     """For whom a speech is; "": nobody knows. before: with looks, turns of the robot, all that was said before."""
     if before.is_first and speech.known is not None and speech.until < speech.known and not _spoken(before):
         found = _looked_at(speech, before) or _answered(speech, before)  # nobody knows that words will come
-        return found if found == ROBOT else called_by(speech.words, (ROBOT, *before.people), before.unseen) or found
+        people = (ROBOT, *(each for each in before.people if each != speech.who))
+        return found if found == ROBOT else called_by(speech.words, people, before.unseen) or found
     is_decided = speech.known is not None and _held_at(speech, before) <= speech.known[0]
     if speech.told and (before.tells == "early" or not is_decided):
         return speech.told
@@ -45,10 +46,10 @@ def addressee(speech: Span, before: Timeline) -> str:
 
 
 def _known_by_name(speech: Span, before: Timeline) -> tuple[str, ...]:
-    """Whom words can call: not who is known by another id alone when they come."""
+    """Whom words can call: not who says them, nor who is known by another id alone when they come."""
     at = speech.known or speech.since
     unknown = {each.who for each in before.joins if at < each.at and not (each.is_known or each.changes)}
-    return (ROBOT, *(each for each in before.people if each not in unknown))
+    return (ROBOT, *(each for each in before.people if each not in unknown | {speech.who}))
 
 
 def called_by(words: str, people: tuple[str, ...], unseen: Collection[str] = ()) -> str:

@@ -117,6 +117,8 @@ class CompanyDrawing(Drawing):
         if not is_unsure or chance.random() < 0.4:
             return chance.choice((*LISTENING, *OTHER) if one.seconds < LONGEST_UNSURE else OTHER)
         who = chance.choice([each for each in (ROBOT, *self.timeline.people) if each != one.who])
+        # "I am Ann" calls nobody. A chance of its own, so that nothing else is drawn anew.
+        who = one.who if random.Random(f"{one.who} {one.since}").random() < 0.2 else who
         name = chance.choice((who, who.title(), CALLED.get(who, who)))
         return chance.choice((*CALLS, *MENTIONS)).format(name, chance.choice(OTHER))
 

@@ -39,21 +39,20 @@ class Group:
         entities = (Entity(id=id, name=name, kind="person", position=(1.0, 0.0, 1.0)) for id, name in people)
         self._take(keys.WORLD, World(entities=tuple(entities)), at)
 
-    def to(self, words: str) -> tuple[str, ...]:
-        """Those to whom bob says this, as it is told when it is over."""
-        self._take(keys.PERCEIVED_ACTION, ActionBegan(actor="bob", action="speak", at=stamp(3.0)), 3.0)
-        heard = Utterance(actor="bob", id="u", text="so", began=stamp(3.0), at=stamp(3.5), final=False)
-        self._take(keys.UTTERANCE, heard, 3.5)
-        self._take(keys.PERCEIVED_ACTION, ActionEnded(actor="bob", action="speak", at=stamp(4.0)), 4.0)
+    def to(self, words: str, since: float = 3.0) -> tuple[str, ...]:
+        """Those to whom bob says this, as it is told when it is over. It takes a second from `since` on."""
+        began, until, known = stamp(since), stamp(since + 1.0), stamp(since + 1.4)
+        id = f"u{since}"
+        self._take(keys.PERCEIVED_ACTION, ActionBegan(actor="bob", action="speak", at=began), since)
+        heard = Utterance(actor="bob", id=id, text="so", began=began, at=stamp(since + 0.5), final=False)
+        self._take(keys.UTTERANCE, heard, since + 0.5)
+        self._take(keys.PERCEIVED_ACTION, ActionEnded(actor="bob", action="speak", at=until), since + 1.0)
         before = self._floors[-1]
-        said = Utterance(
-            actor="bob", id="u", text=words, began=stamp(3.0), ended=stamp(4.0), at=stamp(4.4), final=True
-        )
-        self._take(keys.UTTERANCE, said, 4.4)
+        said = Utterance(actor="bob", id=id, text=words, began=began, ended=until, at=known, final=True)
+        self._take(keys.UTTERANCE, said, since + 1.4)
         told = self._floors[-1]
         assert (before.speeches, told.speeches) == ((), ())
-        assert all((each.since, each.until) == (stamp(3.0), stamp(4.0)) for each in told.ended)
-        return next((each.to for each in told.ended if each.actor == "bob"), ())
+        return next((each.to for each in told.ended if (each.since, each.until) == (began, until)), ())
 
 
 def test_who_is_only_found_has_a_name() -> None:
@@ -97,6 +96,17 @@ def test_a_name_of_two_words_calls_one_person(words: str) -> None:
     group.sees(("p1", "Mary Ann"), ("ann", ""), ("mary", ""))
 
     assert group.to(words) == ("p1",)
+
+
+@pytest.mark.parametrize("words", ["Bob", "I am Bob", "Bob is what they call me"])
+def test_who_says_the_own_name_speaks_to_whoever_listens(words: str) -> None:
+    alone, group = Group(), Group()
+    group.found("ann")
+
+    assert alone.to("Hello there") == (ROBOT,)
+    assert alone.to(words, 6.0) == (ROBOT,)
+    assert group.to(words) == ()
+    assert group.to(f"{words}, Ann", 9.0) == ("ann",)
 
 
 @pytest.mark.parametrize(

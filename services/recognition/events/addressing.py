@@ -6,7 +6,7 @@ would be answered by people who talk with each other. So each speech has address
 stand in one order, from what is certain to what is likely:
 
 1. perception says so (`Utterance.to`);
-2. the words call somebody who is here by name;
+2. the words call somebody else who is here by name: "I am Ann" calls nobody, if Ann says it;
 3. there is nobody else: one person with the robot speaks to it; and so does who types a line;
 4. the gaze: whose face the speaker looks at for most of the speech. In groups of four, whom a speaker looks at is in
    77 of 100 looks the addressee (Vertegaal and others, CHI 2001). People also look away while they think, so that no
@@ -175,7 +175,7 @@ def certain(speech: OwnSpeech, robot: str, names: Mapping[str, str], *, is_line:
     """Addressees by rules 1 to 3; None if these do not say. is_line: it was typed, which one does to the robot."""
     if speech.told is not None:
         return speech.told
-    if found := named(speech.words, names):
+    if found := named(speech.words, names) - {speech.actor}:
         return found
     return None if speech.company and not is_line else frozenset((robot,))
 
