@@ -161,8 +161,7 @@ class Talk(KindRecognizer):
         if self.speeches.going_on is not None:
             self._falls_silent(at)  # it was begun by another id, of which no end has come
         speech = self.speeches.begin(at, confidence, face)
-        speech.told = self._scene.told_to(self.id, at)
-        speech.words = speech.part.words = self._writer.text_of(self.id, at)
+        speech.told, speech.words = self._scene.told_to(self.id, at), self._writer.text_of(self.id, at)
         # What waits in line may be the robot's own turn, so that only the scene knows that it has begun.
         said = self._scene.robot_spoken
         is_into_words = said is not None and said.since <= at
@@ -232,13 +231,11 @@ class Talk(KindRecognizer):
         self.speeches.hear(speech, words, told)
         if not speech.is_heard or speech.is_noise:
             self._has_news(speech, at)
-        words = speech.words
-        self.take(at, lambda talk: self._judge(talk, speech, words, at))
+        self.take(at, lambda talk: self._judge(talk, speech, at))
         self.go_on(at)
 
-    def _judge(self, talk: Dialogue, speech: OwnSpeech, words: str, at: Seconds) -> None:
+    def _judge(self, talk: Dialogue, speech: OwnSpeech, at: Seconds) -> None:
         """Take the words of a speech in their turn; if they decide nothing they are told all the same."""
-        speech.part.words = words
         talk.understand(speech.part, at)
         self._writer.interject_again(self.id, speech.since, at)
         if speech.is_noise and speech.is_heard and says_words(speech.words):
@@ -256,7 +253,7 @@ class Talk(KindRecognizer):
             speech.part.taken_for = ""
         elif not speech.is_heard and not any(each is speech for _, each in self._line):
             speech.is_noise, speech.is_heard = False, True
-            speech.part.until, speech.part.words = speech.until, speech.words
+            speech.part.until = speech.until
             if speech.until is None:
                 self.take_early(speech.since, lambda talk: talk.speaks(speech.part, beside=speech.is_beside))
             elif speech.is_into_turn or speech.is_beside:
@@ -309,7 +306,7 @@ class Talk(KindRecognizer):
     def _begin_again(self, speech: OwnSpeech) -> None:
         """Put a speech in line, in its place."""
         since, until, speech.is_heard, speech.is_decided = speech.since, speech.until, False, False
-        speech.part = SignPart("speak", since, speech.part.confidence, words=speech.words)
+        speech.part = SignPart("speak", since, speech.part.confidence)
         self._line.insert(self._place(since), (since, speech))
         if until is not None:
             self._line.insert(self._place(until), (until, self._end_of(speech, until)))
@@ -449,8 +446,6 @@ class Talk(KindRecognizer):
         """Tell the conversation of a speech, if it is for the robot."""
         if speech.is_to(self._scene.robot):
             speech.is_heard = True
-            if speech.is_beside:  # its words are waited for, whatever the person says next
-                speech.part.words = speech.words
             self._conversation.speaks(speech.part, beside=speech.is_beside)
             is_sign = self._conversation.listener.listens_to(speech.part)
             speech.is_open &= is_sign
