@@ -14,7 +14,7 @@ class Talking(Log):
     def __init__(self) -> None:
         super().__init__("ann", "bob")
 
-    def asks(self, *people: str, since: float, until: float) -> None:
+    def asks(self, *people: str, since: float) -> None:
         """Ask people in one turn; only its beginning is told."""
         for one in people:
             self.feed(request_event("adjacency_pair", since, request=one, block="t", turn="t", responder=one), since)
@@ -42,7 +42,7 @@ class Talking(Log):
 def test_an_answer_after_the_limit_is_late_also_if_somebody_else_may_have_answered_in_time() -> None:
     """The robot listens, so that it does not wait for bob, of whom it is not known to whom he speaks."""
     log = Talking()
-    log.asks("ann", since=1.0, until=2.0)
+    log.asks("ann", since=1.0)
     log.has_asked(2.0)
     log.begins("bob", "speak", 3.4)
     log.requests_event("backchannel", 3.45, responder="ann", block="b")
@@ -63,7 +63,7 @@ def test_who_interrupts_waits_for_nobody_also_after_a_sound_of_their_own() -> No
     log.begins("bob", "speak", 1.0)
     log.begins("ann", "speak", 1.5)
     log.ends("bob", "speak", 1.8)
-    log.asks("bob", since=2.0, until=6.0)
+    log.asks("bob", since=2.0)
     log.begins("bob", "speak", 2.2)
     log.feed(Worded(actor="bob", since=2.2, text="stop, that is not mine"), 3.0)
     log.until(4.0)
@@ -98,7 +98,7 @@ def test_of_two_who_answer_in_one_instant_the_same_has_answered_for_the_rest(fir
 
 def test_who_turns_out_to_be_another_answers_late_all_the_same() -> None:
     log = Talking()
-    log.asks("bob", since=1.0, until=2.0)
+    log.asks("bob", since=1.0)
     log.has_asked(2.0)
     log.until(5.0)
     log.session.join("bob", "ann", 5.0)
