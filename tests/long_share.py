@@ -218,6 +218,14 @@ def is_long_file(path: Path) -> bool:
     return is_named or (path.name.startswith("test_") and REAL_TIME.search(path.read_text("utf-8")) is not None)
 
 
+def may_have_long(path: Path) -> bool:
+    """Whether some test of this file, or folder, may belong to the long share, as is known without loading it."""
+    if path.is_dir() or not path.is_relative_to(TESTS):
+        return True
+    is_named = path.relative_to(TESTS).as_posix() in LONG_TESTS
+    return is_named or is_long_file(path) or (path != TESTS / SMOKE and "real_time" in path.read_text("utf-8"))
+
+
 def _is_importing() -> bool:
     """Whether whoever calls this does so while a module is loaded."""
     return any(frame.f_code.co_filename.startswith("<frozen importlib") for frame, _ in traceback.walk_stack(None))
@@ -261,14 +269,18 @@ class Started:
 class Left:
     """Tells in one line how much `-m "not long"` has left out, also where only workers know it.
 
-    Files that are long as a whole are not even loaded: that is a fifth of what loading all costs.
+    Files that are long as a whole are not even loaded: that is a fifth of what loading all costs. With `-m long` it
+    is those without a long test that are not.
     """
 
     def __init__(self, config: pytest.Config) -> None:
         self.tests, self.files, self._asked = 0, 0, config.option.markexpr == "not long"
+        self._is_rest_asked = config.option.markexpr == "long"
 
     def pytest_ignore_collect(self, collection_path: Path) -> bool | None:
         """Never asked for what is named on the command line."""
+        if self._is_rest_asked and not may_have_long(collection_path):
+            return True
         if not self._asked or collection_path == TESTS or not is_long_file(collection_path):
             return None
         self.files += len([*collection_path.rglob("test_*.py")]) if collection_path.is_dir() else 1

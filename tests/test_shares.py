@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from tests.long_share import LONG, LONG_TESTS, SHORT_PROCESSES, SMOKE, is_long
+from tests.long_share import LONG, LONG_TESTS, SHORT_PROCESSES, SMOKE, is_long, may_have_long
 from tests.longest import LONGEST
 from tests.random_cases import share_of, trials
 
@@ -65,6 +65,14 @@ def test_what_is_in_real_time_or_listed_is_long_but_for_the_smoke(
     file, _, test = name.partition("::")
 
     assert is_long(TESTS / file, test, real_time=real_time) is long
+
+
+@pytest.mark.parametrize(
+    ("name", "may"),
+    [("bus/test_cuts.py", True), ("bus/test_order.py", False), ("control/test_composed.py", True), ("lab", True)],
+)
+def test_for_the_long_share_only_files_are_loaded_that_may_have_some_of_it(name: str, may: bool) -> None:
+    assert may_have_long(TESTS / name) is may
 
 
 def test_what_the_long_share_names_is_there_and_has_a_reason() -> None:
