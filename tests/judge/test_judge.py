@@ -106,7 +106,7 @@ def test_what_is_held_makes_nothing_late_and_goes_on_where_it_stopped(kind: Kind
 @pytest.mark.parametrize("kind", WHOLE)
 def test_these_stories_break_no_law(kind: Kind) -> None:
     found = []
-    for number in WHOLE[kind]:
+    for number in WHOLE[kind][: share_of(len(WHOLE[kind]))]:
         story = generate.story(SEED, number, kind)
         found += [f"{story.seed}: {each}" for each in judge(story, playing.play(story, asks=kind == "sentences"))]
 
