@@ -11,6 +11,7 @@ import os
 import signal
 import sys
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from pathlib import Path
 
 import pytest
 import pytest_asyncio
@@ -18,7 +19,7 @@ from hypothesis import settings
 
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.testing.plugin import virtual_loop
-from tests.long_share import Left, Started, is_long
+from tests.long_share import TESTS, Left, Started, is_long
 from tests.longest import LONGEST
 from tests.skips import Skips
 
@@ -64,6 +65,19 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(Skips(), "skips")
 
 
+class FromBehind(pytest.Package):
+    """All tests, the last ones first."""
+
+    def collect(self) -> Iterator[pytest.Item | pytest.Collector]:
+        return reversed([*super().collect()])
+
+
+def pytest_collect_directory(path: Path, parent: pytest.Collector) -> pytest.Collector | None:
+    """Have every other worker load the tests from behind: what one has compiled by then, the other only reads."""
+    number = int(getattr(parent.config, "workerinput", {}).get("workerid", "gw0").removeprefix("gw"))
+    return FromBehind.from_parent(parent, path=path) if number % 2 and path == TESTS else None
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark the long share before `-m` is judged. Long files first: whoever gets the last ends soon after others."""
@@ -72,7 +86,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         if is_long(item.path, test, real_time=item.get_closest_marker("real_time") is not None):
             item.add_marker("long")
     places = {config.rootpath / "tests" / name: place for place, name in enumerate(LONGEST)}
-    items.sort(key=lambda item: places.get(item.path, len(places)))
+    items.sort(key=lambda item: (places.get(item.path, len(places)), item.path))
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:

@@ -115,6 +115,12 @@ LONG_TESTS = {
         "test_a_recognizer_that_fails_is_told_and_the_speech_has_no_words": "without sound: test_recognizing.py",
         "test_the_voice_is_that_of_the_only_person_whom_others_tell_of": "minutes of sound",
     },
+    "perception/eyes/test_placing.py": {
+        "test_a_camera_is_found_by_the_sheet": "pictures of a sheet are drawn and searched",
+    },
+    "perception/test_pages_heard.py": {
+        "test_a_flood_of_microphones_is_bounded_and_what_is_no_sound_of_ours_is_told": "so many microphones",
+    },
     "perception/test_recognizing.py": {
         "TestSphinx": "speech of many voices through a model; test_hearing.py hears one",
     },
@@ -169,6 +175,10 @@ LONG_TESTS = {
     "simulation/test_party.py": {
         "test_they_talk_over_each_other_as_people_do": "an hour of talk, counted",
         "test_what_is_said_to_others_is_not_the_robots_and_its_questions_are_answered": "two hours of talk, counted",
+    },
+    "study/test_permutation.py": {
+        "test_many_divisions_of_two_samples_are_tested_by_drawing": "so many divisions are drawn",
+        "test_many_pairs_are_tested_by_drawing": "so many signs are drawn",
     },
     "study/test_plots.py": {
         "test_all_plots_are_drawn": "it draws with Matplotlib",
