@@ -95,6 +95,9 @@ LONG_TESTS = {
     "control/test_composed.py": {
         "TestApart": "the same body in other parts; TestComposedBody has all laws",
     },
+    "control/test_repertoire.py": {
+        "test_each_lexeme_is_one_fluid_motion_within_the_limits_and_as_estimated": "all motions of the repertoire",
+    },
     "control/test_silent_voice.py": {
         "TestTorsoWithSilentVoice": "the laws of the torso again, with another voice",
     },
@@ -123,6 +126,9 @@ LONG_TESTS = {
     },
     "perception/test_recognizing.py": {
         "TestSphinx": "speech of many voices through a model; test_hearing.py hears one",
+    },
+    "realizer/test_vocabulary.py": {
+        "test_each_term_is_performed_degraded_or_dropped_as_the_page_says": "all words; conformance/ has the rules",
     },
     "recognition/test_crowd.py": {
         "test_what_is_kept_does_not_grow_with_those_who_have_passed": "thousands of people",
