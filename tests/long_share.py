@@ -90,15 +90,27 @@ LONG_TESTS = {
         "test_as_many_as_are_said_lie_within_the_stated_error": "many calibrations",
     },
     "control/test_contract.py": {
+        "TestArms": "the laws of the torso again, of its arms alone",
+        "TestHeadAlone": "the laws of the torso again, of its head alone",
         "TestNoisyEncoders": "the laws of the torso again, with noise",
+        "TestVoice": "the laws of the torso again, of its voice alone",
     },
     "control/test_composed.py": {
-        "TestApart": "the same body in other parts; TestComposedBody has all laws",
+        "TestApart": "the laws of the torso again, in two parts",
+        "TestComposedBody": "the laws of the torso again, in parts; the others of the file have what is its own",
     },
     "control/test_repertoire.py": {
         "test_each_lexeme_is_one_fluid_motion_within_the_limits_and_as_estimated": "all motions of the repertoire",
     },
+    "control/test_ordinary.py": {
+        "TestScattering": "the laws of test_setpoints.py again, with encoders that scatter",
+        "TestTable": "the laws of test_setpoints.py again, with angles of a table",
+    },
+    "control/test_setpoints.py": {
+        "TestAwaited": "the laws of TestSetPoints again, with commands that take a while",
+    },
     "control/test_silent_voice.py": {
+        "TestSilentVoice": "the laws again, of a voice alone",
         "TestTorsoWithSilentVoice": "the laws of the torso again, with another voice",
     },
     "control/test_liars.py": {
