@@ -158,6 +158,7 @@ LONG_TESTS = {
     "recording/test_realizer_again.py": {
         "test_the_anchor_scenario_is_performed_the_same": "a whole task; random blocks are performed again, too",
         "test_a_report_of_the_body_that_is_missing_or_came_earlier_is_noticed": "random blocks thrice",
+        "test_other_settings_make_it_do_something_else": "random blocks again, with other settings",
     },
     "recording/test_recorder.py": {
         "test_a_whole_task_is_in_the_file_message_for_message": "a whole task; the others of the file have the rules",
