@@ -11,6 +11,7 @@ import os
 import signal
 import sys
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from pathlib import Path
 
 import pytest
 import pytest_asyncio
@@ -18,7 +19,7 @@ from hypothesis import settings
 
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.testing.plugin import virtual_loop
-from tests.long_share import Left, Started, is_long
+from tests.long_share import TESTS, Left, Started, is_long
 from tests.longest import LONGEST
 from tests.skips import Skips
 
@@ -58,8 +59,23 @@ def pytest_configure(config: pytest.Config) -> None:
     )
     config.addinivalue_line("markers", "long: left to `make test-all` (set by conftest: tests/long_share.py)")
     config.pluginmanager.register(Left(config), "left")
+    config.pluginmanager.register(Bugs(), "bugs")
+    config.pluginmanager.register(Started(), "started")
     if not hasattr(config, "workerinput"):
         config.pluginmanager.register(Skips(), "skips")
+
+
+class FromBehind(pytest.Package):
+    """All tests, the last ones first."""
+
+    def collect(self) -> Iterator[pytest.Item | pytest.Collector]:
+        return reversed([*super().collect()])
+
+
+def pytest_collect_directory(path: Path, parent: pytest.Collector) -> pytest.Collector | None:
+    """Have every other worker load the tests from behind: what one has compiled by then, the other only reads."""
+    number = int(getattr(parent.config, "workerinput", {}).get("workerid", "gw0").removeprefix("gw"))
+    return FromBehind.from_parent(parent, path=path) if number % 2 and path == TESTS else None
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -70,7 +86,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         if is_long(item.path, test, real_time=item.get_closest_marker("real_time") is not None):
             item.add_marker("long")
     places = {config.rootpath / "tests" / name: place for place, name in enumerate(LONGEST)}
-    items.sort(key=lambda item: places.get(item.path, len(places)))
+    items.sort(key=lambda item: (places.get(item.path, len(places)), item.path))
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
@@ -92,12 +108,17 @@ def pytest_asyncio_loop_factories(
     return {"virtual": virtual_loop}
 
 
-class _Bugs(logging.Handler):
-    """What `Bus.containing` has kept from ending a service or a client, and what a loop has kept of its callbacks."""
+class Bugs(logging.Handler):
+    """What `Bus.containing` has kept from ending a service or a client, and what a loop has kept of its callbacks.
+
+    Contained or not, an exception that nobody has foreseen fails the test, unless it is what the test is about. It is
+    a plugin and no fixture, which would cost each of ten thousand tests a millisecond.
+    """
 
     def __init__(self) -> None:
         super().__init__(logging.ERROR)
         self.found: list[str] = []
+        self._logs = [logging.getLogger(name) for name in ("engage", "asyncio")]
 
     def emit(self, record: logging.LogRecord) -> None:
         text = logging.Formatter().format(record)
@@ -105,32 +126,21 @@ class _Bugs(logging.Handler):
         if record.name != "asyncio" or text.startswith("Exception in callback"):
             self.found.append(text)
 
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_setup(self) -> None:
+        self.found.clear()
+        for log in self._logs:
+            log.addHandler(self)
 
-@pytest.fixture(autouse=True)
-def _a_bug_is_loud(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Contained or not, an exception that nobody has foreseen fails the test, unless it is what the test is about."""
-    bugs, logs = _Bugs(), [logging.getLogger(name) for name in ("engage", "asyncio")]
-    for log in logs:
-        log.addHandler(bugs)
-    yield
-    for log in logs:
-        log.removeHandler(bugs)
-    expected = request.node.get_closest_marker("contained") is not None
-    assert expected or not bugs.found, "\n".join(bugs.found)
-
-
-@pytest.fixture(autouse=True, scope="session")
-def _started() -> Iterator[Started]:
-    started = Started()
-    with pytest.MonkeyPatch.context() as patch:
-        started.watching(patch)
-        yield started
-
-
-@pytest.fixture(autouse=True)
-def _who_starts_processes_is_long(request: pytest.FixtureRequest, _started: Started) -> Iterator[None]:
-    """A test of real processes that nobody has marked would make `make test` slow, and nobody would see why."""
-    yield from _started.guarded(request.node)
+    @pytest.hookimpl(wrapper=True, tryfirst=True)
+    def pytest_runtest_teardown(self, item: pytest.Item) -> Iterator[None]:
+        try:
+            yield
+        finally:
+            for log in self._logs:
+                log.removeHandler(self)
+        expected = item.get_closest_marker("contained") is not None
+        assert expected or not self.found, "\n".join(self.found)
 
 
 @pytest.fixture(autouse=True)

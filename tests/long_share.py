@@ -51,6 +51,8 @@ LONG = {
     "study/test_heads_like_peoples.py": "whole sessions; generation/test_living_head.py has each policy",
     "test_skips.py": "each test runs pytest; it guards a tool and not the robot",
     "cli/test_simulate.py": "whole tasks in processes of their own; study/ has what is made of them",
+    "control/mujoco/test_mujoco_contract.py": "all laws in physics; test_as_simulated.py compares it with the torso",
+    "control/reachy_mini/test_contract.py": "all laws on a driver that test_outages.py and others have in parts",
     "control/mujoco/test_beside.py": "another robot in physics; test_mujoco_contract.py has all laws",
     "control/mujoco/test_chosen_again.py": "whole fragments in physics",
     "control/mujoco/test_faults.py": "each fault in physics; test_mujoco_contract.py has all laws",
@@ -67,6 +69,8 @@ LONG_TESTS = {
         "test_a_demo_is_recorded": "a whole task",
     },
     "cli/test_demo.py": {
+        "test_the_same_seed_gives_the_same_session": "a whole task again",
+        "test_people_talk_with_each_other_and_the_robot_asks": "a whole party",
         "test_a_misplaced_piece_is_asked_for_again": "a whole task; test_appendix_b.py has it, too",
         "test_another_seed_gives_other_times_but_the_same_story_and_quiet_prints_nothing": "a whole task",
         "test_lines_on_stdout_leave_it_to_them": "a whole task",
@@ -86,12 +90,27 @@ LONG_TESTS = {
         "test_as_many_as_are_said_lie_within_the_stated_error": "many calibrations",
     },
     "control/test_contract.py": {
+        "TestArms": "the laws of the torso again, of its arms alone",
+        "TestHeadAlone": "the laws of the torso again, of its head alone",
         "TestNoisyEncoders": "the laws of the torso again, with noise",
+        "TestVoice": "the laws of the torso again, of its voice alone",
     },
     "control/test_composed.py": {
-        "TestApart": "the same body in other parts; TestComposedBody has all laws",
+        "TestApart": "the laws of the torso again, in two parts",
+        "TestComposedBody": "the laws of the torso again, in parts; the others of the file have what is its own",
+    },
+    "control/test_repertoire.py": {
+        "test_each_lexeme_is_one_fluid_motion_within_the_limits_and_as_estimated": "all motions of the repertoire",
+    },
+    "control/test_ordinary.py": {
+        "TestScattering": "the laws of test_setpoints.py again, with encoders that scatter",
+        "TestTable": "the laws of test_setpoints.py again, with angles of a table",
+    },
+    "control/test_setpoints.py": {
+        "TestAwaited": "the laws of TestSetPoints again, with commands that take a while",
     },
     "control/test_silent_voice.py": {
+        "TestSilentVoice": "the laws again, of a voice alone",
         "TestTorsoWithSilentVoice": "the laws of the torso again, with another voice",
     },
     "control/test_liars.py": {
@@ -100,14 +119,56 @@ LONG_TESTS = {
     "docs/test_making_pages.py": {
         "test_arrows_point_down_and_boxes_keep_apart": "it draws all pictures of the site",
     },
+    "perception/pieces/test_pieces.py": {
+        "test_a_film_of_a_table_becomes_the_world": "a film is drawn, written and read",
+    },
+    "perception/test_hearing.py": {
+        "test_a_person_answers_the_robot_and_asks_it_by_sound_alone": "a conversation by sound",
+        "test_one_person_is_heard_in_whichever_channel_of_a_file": "minutes of sound; another test has two channels",
+        "test_while_the_robot_speaks_nothing_is_heard_if_so_set": "a robot that speaks, and sound",
+        "test_of_several_people_one_channel_cannot_tell_whose_voice_it_is_and_that_is_told": "minutes of sound",
+        "test_a_recognizer_that_fails_is_told_and_the_speech_has_no_words": "without sound: test_recognizing.py",
+        "test_the_voice_is_that_of_the_only_person_whom_others_tell_of": "minutes of sound",
+    },
+    "perception/eyes/test_placing.py": {
+        "test_a_camera_is_found_by_the_sheet": "pictures of a sheet are drawn and searched",
+    },
+    "perception/test_pages_heard.py": {
+        "test_a_flood_of_microphones_is_bounded_and_what_is_no_sound_of_ours_is_told": "so many microphones",
+    },
+    "perception/test_recognizing.py": {
+        "TestSphinx": "speech of many voices through a model; test_hearing.py hears one",
+    },
+    "realizer/test_vocabulary.py": {
+        "test_each_term_is_performed_degraded_or_dropped_as_the_page_says": "all words; conformance/ has the rules",
+    },
     "recognition/test_crowd.py": {
         "test_what_is_kept_does_not_grow_with_those_who_have_passed": "thousands of people",
     },
+    "generation/test_same_choices.py": {
+        "test_far_less_is_asked_than_there_is": "it counts over many fragments what the others of the file compare",
+    },
     "recording/test_again.py": {
+        "test_the_anchor_scenario_gives_the_same_events": "a whole task; three people and a restart are played, too",
         "test_raw_perception_gives_the_same_events": "a whole task seen by cameras",
     },
     "recording/test_analyse.py": {
         "test_the_numbers_of_a_recording_are_those_of_the_live_run": "a whole task, by chance",
+    },
+    "recording/test_realizer_again.py": {
+        "test_the_anchor_scenario_is_performed_the_same": "a whole task; random blocks are performed again, too",
+        "test_a_report_of_the_body_that_is_missing_or_came_earlier_is_noticed": "random blocks thrice",
+        "test_other_settings_make_it_do_something_else": "random blocks again, with other settings",
+    },
+    "recording/test_recorder.py": {
+        "test_a_whole_task_is_in_the_file_message_for_message": "a whole task; the others of the file have the rules",
+        "test_status_and_capabilities_of_those_who_come_are_asked_for": "a whole task",
+    },
+    "recording/test_tiers.py": {
+        "test_every_connection_event_is_an_annotation_with_its_times": "a whole task",
+        "test_looks_of_both_sides_are_those_that_were_told": "a whole task",
+        "test_an_eaf_is_read_by_another_library_as_it_was_meant": "a whole task",
+        "test_a_table_has_a_row_for_each_annotation": "a whole task",
     },
     "recording/test_replay.py": {
         "test_a_whole_task_comes_again_message_for_message": "a whole task; the others of the file have the rules",
@@ -118,6 +179,9 @@ LONG_TESTS = {
     },
     "scenario/test_appendix_b.py": {
         "test_a_misplaced_piece_is_asked_to_be_fixed_and_then_is_right": "another whole task",
+        "test_robot_initiated_events_come_in_the_order_and_with_the_outcomes_of_the_transcript[object]": (
+            "the task at the other resolution; recognition/test_appendix_b.py has both without a robot"
+        ),
         "test_everybody_looks_where_the_transcript_says[3]": "the task with another seed",
         "test_the_same_seed_gives_the_same_run_and_another_seed_the_same_events": (
             "the task again, and with another seed; test_demo.py has the same seed"
@@ -126,6 +190,14 @@ LONG_TESTS = {
     },
     "scenario/test_words.py": {
         "test_all_that_the_simulated_person_says_are_words_of_events": "whole tasks, by chance",
+    },
+    "simulation/test_party.py": {
+        "test_they_talk_over_each_other_as_people_do": "an hour of talk, counted",
+        "test_what_is_said_to_others_is_not_the_robots_and_its_questions_are_answered": "two hours of talk, counted",
+    },
+    "study/test_permutation.py": {
+        "test_many_divisions_of_two_samples_are_tested_by_drawing": "so many divisions are drawn",
+        "test_many_pairs_are_tested_by_drawing": "so many signs are drawn",
     },
     "study/test_plots.py": {
         "test_all_plots_are_drawn": "it draws with Matplotlib",
@@ -175,50 +247,69 @@ def is_long_file(path: Path) -> bool:
     return is_named or (path.name.startswith("test_") and REAL_TIME.search(path.read_text("utf-8")) is not None)
 
 
+def may_have_long(path: Path) -> bool:
+    """Whether some test of this file, or folder, may belong to the long share, as is known without loading it."""
+    if path.is_dir() or not path.is_relative_to(TESTS):
+        return True
+    is_named = path.relative_to(TESTS).as_posix() in LONG_TESTS
+    return is_named or is_long_file(path) or (path != TESTS / SMOKE and "real_time" in path.read_text("utf-8"))
+
+
 def _is_importing() -> bool:
     """Whether whoever calls this does so while a module is loaded."""
     return any(frame.f_code.co_filename.startswith("<frozen importlib") for frame, _ in traceback.walk_stack(None))
 
 
 class Started:
-    """Counts processes that are started from here, by `subprocess` or by asyncio, which uses it."""
+    """Counts processes that are started from here, by `subprocess` or by asyncio, which uses it.
+
+    A test of real processes that nobody has marked would make `make test` slow, and nobody would see why: it fails.
+    """
 
     def __init__(self) -> None:
-        self.number = 0
+        self.number = self._before = 0
+        self._patch = pytest.MonkeyPatch()
 
-    def watching(self, patch: pytest.MonkeyPatch) -> None:
-        """Count from now on, until the patch is undone.
-
-        What a library starts while it is imported is not counted: MuJoCo's glfw does so, in whichever test loads it.
-        """
+    def pytest_sessionstart(self) -> None:
+        """Count from now on. What a library starts while it is imported is not counted: MuJoCo's glfw does so."""
         begin = subprocess.Popen.__init__
 
         def counted(process: "subprocess.Popen[Any]", *arguments: Any, **options: Any) -> None:
             self.number += not _is_importing()
             begin(process, *arguments, **options)
 
-        patch.setattr(subprocess.Popen, "__init__", counted)
+        self._patch.setattr(subprocess.Popen, "__init__", counted)
 
-    def guarded(self, item: pytest.Item) -> Iterator[None]:
-        """Fail if a test of the short share has started a process meanwhile."""
-        before = self.number
+    def pytest_sessionfinish(self) -> None:
+        self._patch.undo()
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_setup(self) -> None:
+        self._before = self.number
+
+    @pytest.hookimpl(wrapper=True, tryfirst=True)
+    def pytest_runtest_teardown(self, item: pytest.Item) -> Iterator[None]:
         yield
         name = item.path.relative_to(TESTS).as_posix()
-        if self.number > before and item.get_closest_marker("long") is None and name not in SHORT_PROCESSES:
+        if self.number > self._before and item.get_closest_marker("long") is None and name not in SHORT_PROCESSES:
             pytest.fail(f"it starts a process: mark it `real_time`, or list {name} in tests/long_share.py")
 
 
 class Left:
     """Tells in one line how much `-m "not long"` has left out, also where only workers know it.
 
-    Files that are long as a whole are not even loaded: that is a fifth of what loading all costs.
+    Files that are long as a whole are not even loaded: that is a fifth of what loading all costs. With `-m long` it
+    is those without a long test that are not.
     """
 
     def __init__(self, config: pytest.Config) -> None:
         self.tests, self.files, self._asked = 0, 0, config.option.markexpr == "not long"
+        self._is_rest_asked = config.option.markexpr == "long"
 
     def pytest_ignore_collect(self, collection_path: Path) -> bool | None:
         """Never asked for what is named on the command line."""
+        if self._is_rest_asked and not may_have_long(collection_path):
+            return True
         if not self._asked or collection_path == TESTS or not is_long_file(collection_path):
             return None
         self.files += len([*collection_path.rglob("test_*.py")]) if collection_path.is_dir() else 1

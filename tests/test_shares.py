@@ -1,6 +1,7 @@
 """How many random cases are tried, which tests are long, and which files begin first."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -8,7 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from tests.long_share import LONG, LONG_TESTS, SHORT_PROCESSES, SMOKE, is_long
+from tests.long_share import LONG, LONG_TESTS, SHORT_PROCESSES, SMOKE, is_long, may_have_long
 from tests.longest import LONGEST
 from tests.random_cases import share_of, trials
 
@@ -24,10 +25,10 @@ def profile(request: pytest.FixtureRequest):
     settings.load_profile(before)
 
 
-def test_a_sixth_is_tried_but_at_least_one_unless_all_are_asked_for(profile: str) -> None:
-    told = [share_of(whole) for whole in (1, 6, 7, 300)]
+def test_a_twelfth_is_tried_but_at_least_one_unless_all_are_asked_for(profile: str) -> None:
+    told = [share_of(whole) for whole in (1, 12, 13, 300)]
 
-    assert told == ([1, 1, 2, 50] if profile == "same" else [1, 6, 7, 300])
+    assert told == ([1, 1, 2, 25] if profile == "same" else [1, 12, 13, 300])
     assert trials() == (1 if profile == "same" else None)
 
 
@@ -66,14 +67,26 @@ def test_what_is_in_real_time_or_listed_is_long_but_for_the_smoke(
     assert is_long(TESTS / file, test, real_time=real_time) is long
 
 
+@pytest.mark.parametrize(
+    ("name", "may"),
+    [("bus/test_cuts.py", True), ("bus/test_order.py", False), ("control/test_composed.py", True), ("lab", True)],
+)
+def test_for_the_long_share_only_files_are_loaded_that_may_have_some_of_it(name: str, may: bool) -> None:
+    assert may_have_long(TESTS / name) is may
+
+
 def test_what_the_long_share_names_is_there_and_has_a_reason() -> None:
     named = {**LONG, **SHORT_PROCESSES}
     tests = [(file, test) for file, named in LONG_TESTS.items() for test in named]
 
     assert [name for name in (*named, *LONG_TESTS) if not (TESTS / name).exists()] == []
-    assert [each for file, each in tests if f" {each.partition('[')[0]}(" not in (TESTS / file).read_text()] == []
+    assert [each for file, each in tests if not re.search(rf" {each.partition('[')[0]}[(:]", _text(file))] == []
     assert all(named.values())
     assert all(all(each.values()) for each in LONG_TESTS.values())
+
+
+def _text(file: str) -> str:
+    return (TESTS / file).read_text("utf-8")
 
 
 CONFTEST = """\
@@ -89,14 +102,9 @@ def pytest_collection_modifyitems(items):
 def pytest_configure(config):
     for mark in ("real_time", "long"):
         config.addinivalue_line("markers", mark)
+    long_share.TESTS = config.rootpath
     config.pluginmanager.register(long_share.Left(config))
-
-@pytest.fixture(autouse=True)
-def _guard(request, monkeypatch):
-    long_share.TESTS = request.config.rootpath
-    started = long_share.Started()
-    started.watching(monkeypatch)
-    yield from started.guarded(request.node)
+    config.pluginmanager.register(long_share.Started())
 """
 STARTS = "import pytest, subprocess, sys\n{}def test_it(): subprocess.run([sys.executable, '-c', ''], check=True)\n"
 

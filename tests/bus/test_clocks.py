@@ -5,6 +5,7 @@ import pytest
 
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.zenoh.clocks import DRIFT, KEPT, REFRESH, Clocks
+from tests.random_cases import share_of
 
 
 def test_the_own_clock_needs_no_estimate():
@@ -72,7 +73,7 @@ def test_the_own_clock_and_none_are_never_measured(clock: str):
     assert clocks.offsets == ()
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(share_of(40)))
 def test_no_instant_is_further_off_than_is_told(seed: int):
     """Two clocks that go as they like within 50 ppm, and paths as slow, shaky and lopsided as chance makes them."""
     chance = Random(seed)

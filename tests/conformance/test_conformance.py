@@ -2,8 +2,9 @@
 
 import asyncio
 import re
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager
+from itertools import groupby
 from pathlib import Path
 
 import pytest
@@ -34,8 +35,15 @@ from engage_hri.services.requests.ends import Requester, RequestRefused
 from engage_hri.services.runtime.service import Service, running
 from engage_hri.services.simulation.still import table_world
 from tests.conformance.case import Case, Written, cases
+from tests.random_cases import share_of
 
-CASES = list(cases(Path(__file__).parent / "cases"))
+
+def tried() -> Iterator[Case]:
+    """Each rule in one dialect, of which each has its turn, or in all: `test_dialects.py` compares their nets."""
+    found = groupby(cases(Path(__file__).parent / "cases"), key=lambda case: case.rule)
+    for number, spelled in enumerate([*each] for _, each in found):
+        first = number % len(spelled)
+        yield from (spelled[first:] + spelled[:first])[: share_of(len(spelled), 4)]
 
 
 class Seen(Struct):
@@ -64,7 +72,7 @@ class Seen(Struct):
         return found
 
 
-@pytest.mark.parametrize("case", CASES, ids=str)
+@pytest.mark.parametrize("case", [*tried()], ids=str)
 async def test_rule(case: Case) -> None:
     seen = Seen()
     async with _system(seen, load(settings=case.settings)) as requests:

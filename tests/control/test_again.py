@@ -41,6 +41,7 @@ from engage_hri.services.runtime.intake import AnswerRequest
 from engage_hri.services.runtime.service import running
 from tests.commanding import command
 from tests.ledgers import RecordedLives, changed_step
+from tests.random_cases import share_of
 
 CONFIG = ControlConfig(variability=Variability(seed=5))
 FAULTS = (
@@ -165,7 +166,7 @@ async def recorded(hub: MemoryHub, seed: int, lives: int = 1) -> RecordedLives:
     return record
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(share_of(8)))
 async def test_each_life_of_control_decides_the_same_again(hub: MemoryHub, seed: int) -> None:
     record = await recorded(hub, seed, lives=2)
 

@@ -26,7 +26,7 @@ from engage_hri.services.control.testing.contract import BodyContract
 from engage_hri.services.control.testing.stage import Stage, performed
 from engage_hri.services.control.testing.suite import BEHAVIORS, WORLD
 from engage_hri.services.control.torso.body import SimulatedBody
-from tests.random_cases import trials
+from tests.random_cases import share_of, trials
 
 ALL = ("head", "face", "torso", "left_arm", "right_arm", "voice")
 
@@ -67,7 +67,7 @@ async def test_a_single_driver_with_all_its_parts_stays_as_it_is():
     assert composed([Member("simulated", body, body.capabilities.parts)]) is body
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(share_of(20)))
 async def test_each_part_does_what_it_does_alone(seed: int):
     chance = Random(seed)
     behavior = chance.choice(BEHAVIORS)

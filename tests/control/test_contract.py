@@ -11,6 +11,7 @@ from engage_hri.services.control.contract.body import Body, BodyState
 from engage_hri.services.control.testing import BodyContract, played
 from engage_hri.services.control.torso.body import SimulatedBody
 from tests.control.liars_by_deed import Noisy
+from tests.random_cases import trials
 
 FAULTS = {
     "a slow neck": Variability(slow=(Slow(part="head", factor=3.0),)),
@@ -39,6 +40,7 @@ class TestSimulatedBody(BodyContract):
 
 
 class TestNoisyEncoders(BodyContract):
+    seeds = trials()
     noise = math.radians(0.3)
 
     def make(self) -> Body:
@@ -80,15 +82,21 @@ class HeadAlone(Partial):
 
 
 class TestVoice(BodyContract):
+    seeds = trials()
+
     def make(self) -> Body:
         return Voice()
 
 
 class TestArms(BodyContract):
+    seeds = trials()
+
     def make(self) -> Body:
         return Arms()
 
 
 class TestHeadAlone(BodyContract):
+    seeds = trials()
+
     def make(self) -> Body:
         return HeadAlone()

@@ -16,6 +16,7 @@ from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.body import Body, BodyFailed, Progress
 from engage_hri.services.control.testing import Stage
 from engage_hri.services.control.testing.findings import aside, beside
+from tests.random_cases import share_of
 
 POINTED, LOOKED = 0.05, 0.05
 """Metres by which a forearm may pass its target, as capabilities say, and radians by which eyes may look beside."""
@@ -155,7 +156,7 @@ async def test_what_is_seen_no_more_was_last_seen_there() -> None:
     assert stage.passed[-1] == "end"
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(share_of(12)))
 async def test_nothing_untrue_is_told_whatever_moves_when(seed: int) -> None:
     chance, body = Random(f"follow {seed}"), new("simulated")
     at = dict.fromkeys(PLACE, 0.0)

@@ -13,6 +13,7 @@ from engage_hri.services.bus.deadlines import LATE
 from engage_hri.services.control.contract.body import Body, BodyFailed, MovementAuthority, Reached, TakenOver
 from engage_hri.services.control.testing import WORLD, BodyContract, Stage
 from tests.control.test_docs import driver
+from tests.random_cases import share_of, trials
 from tests.standing_still import stand_still
 
 SCATTER = 0.0052
@@ -42,6 +43,7 @@ class Table(driver().PanTilt):  # type: ignore[misc]
 
 
 class TestScattering(BodyContract):
+    seeds = trials()
     tolerance, noise, accuracy = 0.15, SCATTER, 2 * SCATTER + 4 * SCATTER
 
     def make(self) -> Body:
@@ -49,13 +51,14 @@ class TestScattering(BodyContract):
 
 
 class TestTable(BodyContract):
+    seeds = trials()
     tolerance = 0.15
 
     def make(self) -> Body:
         return Table()
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(share_of(20)))
 async def test_the_end_of_a_look_is_told_when_the_head_is_back(seed: int) -> None:
     body = Scattering()
     body.chance = Random(seed)

@@ -27,6 +27,7 @@ from engage_hri.services.control.contract.body import MovementAuthority
 from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.runtime.steps import finished
+from tests.random_cases import share_of
 
 ROUNDING = 1e-9
 """Degrees by which an estimate of a posture may differ from a full one. Seen: 1e-12."""
@@ -87,10 +88,10 @@ async def performing(body: SimulatedBody, *behaviors: BlockBehavior) -> AsyncIte
     await asyncio.gather(*tasks, return_exceptions=True)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(share_of(6)))
 async def test_at_rest_from_any_pose_they_are_the_same(seed: int) -> None:
     chance = random.Random(seed)
-    for _ in range(8):
+    for _ in range(share_of(8, 2)):
         seen, body = world(chance), SimulatedBody()
         poses: list[BodyPose | None] = [None, *(pose(chance) for _ in range(4))]
         for _ in range(3):
@@ -101,7 +102,7 @@ async def test_at_rest_from_any_pose_they_are_the_same(seed: int) -> None:
             poses += [pose for each in brief for pose in (each.pose_after, each.pose_end) if pose is not None]
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(share_of(3)))
 @pytest.mark.parametrize(
     "moving",
     [

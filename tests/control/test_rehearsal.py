@@ -11,6 +11,7 @@ from engage_hri.schemas.body import EstimateItem, PlannedTime
 from engage_hri.services.control.contract.body import BehaviorRefused, MovementAuthority, Reached
 from engage_hri.services.control.testing import WORLD
 from engage_hri.services.control.torso.body import SimulatedBody
+from tests.random_cases import share_of
 
 EXACT = 0.002
 """Seconds by which a phase may be other than rehearsed."""
@@ -87,7 +88,7 @@ def off(one: dict[str, float], other: dict[str, float]) -> float:
     return max((abs(one[sync] - other[sync]) for sync in one), default=0.0)
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", range(share_of(60)))
 async def test_it_is_as_fast_as_rehearsed_beside_another_that_has_its_part_or_carries_it(seed: int) -> None:
     chance = Random(seed)
     part = chance.choice(["head", "left_arm"])

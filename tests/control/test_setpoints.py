@@ -10,6 +10,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.services.control.contract.body import Body, BodyFailed
 from engage_hri.services.control.testing import WORLD, BodyContract, Stage, performed
 from tests.control.test_docs import SET_POINTS, driver
+from tests.random_cases import trials
 from tests.test_examples import EXAMPLES, example
 
 LOOK = Gaze(id="look", target="near-right")
@@ -22,6 +23,7 @@ def robot() -> SetPointBody:
 
 
 class TestSetPoints(BodyContract):
+    seeds = trials()
     tolerance = 0.1
 
     def make(self) -> Body:
@@ -48,6 +50,7 @@ class Awaited(driver().PanTilt):  # type: ignore[misc]
 
 
 class TestAwaited(BodyContract):
+    seeds = trials()
     tolerance = 0.15
 
     def make(self) -> Body:

@@ -16,16 +16,21 @@ from engage_hri.services.control.contract.body import BehaviorRefused, Body, Bod
 from engage_hri.services.control.testing import WORLD, BodyContract, Stage, performed
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.control.voice.silent import SilentVoice
+from tests.random_cases import trials
 
 SPEECH = Speech(id="s", text="This piece, please: 这块。", marks=(Mark("m", 5), Mark("n", 11), Mark("o", 20)))
 
 
 class TestSilentVoice(BodyContract):
+    seeds = trials()
+
     def make(self) -> Body:
         return SilentVoice()
 
 
 class TestTorsoWithSilentVoice(BodyContract):
+    seeds = trials()
+
     def make(self) -> Body:
         return made(ControlConfig(voice="silent"))
 

@@ -10,7 +10,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
-import pytest
 from msgspec import Struct
 
 import engage_hri
@@ -27,6 +26,7 @@ STRUCTS = {name: thing for name, thing in THINGS.items() if isinstance(thing, ty
 UNIT = re.compile(r"\b(seconds|metres|meters|radians|degrees|m/s|loop times?|how many|words|count|characters|line)\b")
 """What says of a bare number what it counts or measures; so does a range, such as 0..1."""
 RANGE = re.compile(r"\d\.\.\d|[([]\d, \d[)\]]|>= 0|from 1")
+SENTENCE = re.compile(r"[A-Z]\w* .*\.", re.DOTALL)
 RAISED = re.compile(r"^    (\w+): ", re.MULTILINE)
 CALLS_INTO = (robot, performing, orders, inputs, feeds, body)
 """Files whose functions the public ones call."""
@@ -44,9 +44,6 @@ class Public(NamedTuple):
         """What it says of itself, or what it inherits from the method that it overrides."""
         method = getattr(THINGS[self.owner], self.node.name) if self.owner else None
         return ast.get_docstring(self.node) or (inspect.getdoc(method) if method is not None else "") or ""
-
-    def __str__(self) -> str:
-        return self.name
 
 
 def functions() -> Iterator[Public]:
@@ -88,37 +85,44 @@ def raises(doc: str) -> set[str]:
     return set(RAISED.findall(part))
 
 
-@pytest.mark.parametrize("public", PUBLIC, ids=str)
-def test_a_public_function_begins_with_a_sentence(public: Public) -> None:
-    first = public.doc.split("\n\n")[0]
+def test_public_functions_begin_with_a_sentence() -> None:
+    firsts = {public.name: public.doc.split("\n\n")[0] for public in PUBLIC}
 
-    assert re.fullmatch(r"[A-Z]\w* .*\.", first, re.DOTALL), first or "nothing"
-
-
-@pytest.mark.parametrize("public", PUBLIC, ids=str)
-def test_each_parameter_is_told_of(public: Public) -> None:
-    missing = [each.arg for each in parameters(public.node) if not told(public.doc, each.arg)]
-
-    assert not missing
+    assert not {name: first for name, first in firsts.items() if not SENTENCE.fullmatch(first)}
 
 
-@pytest.mark.parametrize("public", PUBLIC, ids=str)
-def test_a_number_has_its_unit_in_words_or_in_its_type(public: Public) -> None:
-    for each in parameters(public.node):
-        kinds = set(re.findall(r"\w+", ast.unparse(each.annotation))) if each.annotation else set()
-        if kinds & {"float", "int", "Seconds"}:
-            assert UNIT.search(told(public.doc, each.arg)), each.arg
+def test_each_parameter_is_told_of() -> None:
+    assert not [
+        (public.name, each.arg)
+        for public in PUBLIC
+        for each in parameters(public.node)
+        if not told(public.doc, each.arg)
+    ]
 
 
-@pytest.mark.parametrize("name", STRUCTS)
-def test_each_field_is_told_of_and_each_bare_number_has_a_unit(name: str) -> None:
-    said = dict(_fields(STRUCTS[name]))
+def test_a_number_has_its_unit_in_words_or_in_its_type() -> None:
+    assert not [
+        (public.name, each.arg)
+        for public in PUBLIC
+        for each in parameters(public.node)
+        if _is_number(each) and not UNIT.search(told(public.doc, each.arg))
+    ]
 
-    assert set(said) == set(STRUCTS[name].__struct_fields__)
-    for field, (kind, text) in said.items():
-        assert text, f"nothing is said of {field}"
-        if re.findall(r"\b(?:float|int)\b", kind):
-            assert UNIT.search(text) or RANGE.search(text), f"{field}: {text}"
+
+def _is_number(parameter: ast.arg) -> bool:
+    kinds = set(re.findall(r"\w+", ast.unparse(parameter.annotation))) if parameter.annotation else set()
+    return bool(kinds & {"float", "int", "Seconds"})
+
+
+def test_each_field_is_told_of_and_each_bare_number_has_a_unit() -> None:
+    for name, struct in STRUCTS.items():
+        said = dict(_fields(struct))
+
+        assert set(said) == set(struct.__struct_fields__), name
+        for field, (kind, text) in said.items():
+            assert text, f"nothing is said of {name}.{field}"
+            if re.findall(r"\b(?:float|int)\b", kind):
+                assert UNIT.search(text) or RANGE.search(text), f"{name}.{field}: {text}"
 
 
 def _fields(kind: type[Struct]) -> Iterator[tuple[str, tuple[str, str]]]:
@@ -136,21 +140,21 @@ def _fields(kind: type[Struct]) -> Iterator[tuple[str, tuple[str, str]]]:
                 yield name, (ast.unparse(field.annotation), text or told(ast.get_docstring(node) or "", name))
 
 
-@pytest.mark.parametrize("public", PUBLIC, ids=str)
-def test_what_a_function_raises_is_said(public: Public) -> None:
+def test_what_a_function_raises_is_said() -> None:
     """As far as its own files go: what the bus raises when it is lost, the class says once for all."""
-    coming = set(_coming(public.node, public.owner, set()))
+    for public in PUBLIC:
+        coming = set(_coming(public.node, public.owner, set()))
 
-    assert coming <= raises(public.doc) | _bases(raises(public.doc))
+        assert coming <= raises(public.doc) | _bases(raises(public.doc)), public.name
 
 
-@pytest.mark.parametrize("public", [each for each in PUBLIC if "Raises:" in each.doc], ids=str)
-def test_what_is_said_to_be_raised_is_an_error(public: Public) -> None:
-    assert raises(public.doc)
-    for name in raises(public.doc):
-        kind = _error(name)
-        assert isinstance(kind, type), name
-        assert issubclass(kind, Exception), name
+def test_what_is_said_to_be_raised_is_an_error() -> None:
+    for public in PUBLIC:
+        assert raises(public.doc) or "Raises:" not in public.doc, public.name
+        for name in raises(public.doc):
+            kind = _error(name)
+            assert isinstance(kind, type), (public.name, name)
+            assert issubclass(kind, Exception), (public.name, name)
 
 
 def test_the_search_for_errors_finds_those_of_others() -> None:

@@ -211,7 +211,7 @@ async def recorded(hub: MemoryHub, seed: int, lives: int = 1) -> RecordedLives:
     return record
 
 
-@pytest.mark.parametrize("seed", range(share_of(24)))
+@pytest.mark.parametrize("seed", range(share_of(24, 24)))
 async def test_each_life_of_generation_decides_the_same_again(hub: MemoryHub, seed: int) -> None:
     record = await recorded(hub, seed, lives=2)
 

@@ -18,6 +18,7 @@ from engage_hri.services.generation.turns.interjections import UNDECIDED, WORDLE
 from engage_hri.services.generation.turns.policy import TurnPolicy
 from tests.generation.test_talked_into import LONG, call, robot
 from tests.generation.test_turn_policy import fragment
+from tests.random_cases import share_of
 
 PEOPLE = ("ann", "bob", "cy")
 """The robot speaks to the first two."""
@@ -72,7 +73,7 @@ def expected(said: Said, named: object, after: float) -> tuple[float | None, flo
     return (known if said.reading == "interruption" and known is not None else None), counts, until
 
 
-@pytest.mark.parametrize("seed", range(300))
+@pytest.mark.parametrize("seed", range(share_of(300)))
 def test_a_speech_breaks_the_turn_off_only_if_it_may_and_lasts(seed: int) -> None:
     chance = random.Random(seed)
     named = chance.choice((None, True, False, "*", "cy", ("ann",), ("ann", "cy"), ()))

@@ -25,6 +25,7 @@ from engage_hri.services.runtime.service import running
 from tests.generation.emitted import POINT, block, by_id, emission, lines, reference
 from tests.generation.test_talked_into import call, robot
 from tests.generation.test_turn_policy import fragment
+from tests.random_cases import share_of
 
 PEOPLE = ("ann", "bob", "cy", "dan")
 WORLD = World(entities=tuple(Entity(id=id, kind="person", position=(1.0, 0.0, 1.2)) for id in ("ann", "bob", "cy")))
@@ -113,7 +114,7 @@ def looks(behaviors: Iterable[object]) -> list[str]:
     return [each.target for each in behaviors if isinstance(each, Gaze)]
 
 
-@pytest.mark.parametrize("seed", range(200))
+@pytest.mark.parametrize("seed", range(share_of(200)))
 def test_each_is_looked_at_once_and_the_first_at_last(seed: int) -> None:
     chance = random.Random(seed)
     people = PEOPLE[: chance.randint(2, 4)]

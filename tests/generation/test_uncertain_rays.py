@@ -10,6 +10,7 @@ from engage_hri.schemas.body import Ray
 from engage_hri.schemas.world import Entity
 from engage_hri.services.generation.references.pairs import laid_out
 from tests.generation.tables import in_gaze_cone, in_pointing_cylinder
+from tests.random_cases import share_of
 
 EYES = Ray(origin=(0.0, 0.0, 1.0), axis=(0.0, 0.0, -1.0))
 ARM = Ray(origin=(0.0, 0.0, 0.0), axis=(1.0, 0.0, 0.0), tip=(0.25, 0.0, 0.0))
@@ -38,7 +39,7 @@ def test_a_forearm_of_an_error_has_a_cylinder_that_widens_from_the_elbow() -> No
     assert in_pointing_cylinder(wide, 0.05, laid_out([thing("behind the hand", 0.2, 0.0)])) == frozenset()
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(share_of(20)))
 def test_it_holds_whatever_an_arm_within_the_error_points_at(seed: int) -> None:
     """Oracle: arms turned at random within the error, each with a cylinder of its own."""
     chance = Random(seed)

@@ -19,6 +19,7 @@ from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
 from engage_hri.services.realizer.together.knowledge import needed_by, waiting_for
 from engage_hri.services.realizer.together.live_blocks import LiveBlocks, WaitingBlock
+from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.planning import timed
 from tests.realizer.stage import after, block
@@ -131,7 +132,7 @@ def world(blocks: Told, late: Point | None = None) -> World:
     return made
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", range(share_of(60)))
 def test_what_comes_later_if_a_point_is_late_waits_for_it_and_nothing_else_does(seed: int) -> None:
     """Where another order would serve then, the plans differ, and say nothing."""
     blocks = told(Random(seed))

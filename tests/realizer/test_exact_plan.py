@@ -27,7 +27,7 @@ from tests.random_cases import share_of
 from tests.realizer.exact_blocks import OFF, WORLD, Performed, perform, performed
 from tests.realizer.planning import timed
 
-BLOCKS = share_of(300, 24)
+BLOCKS = share_of(300, 60)
 MOST = {False: 0.02, True: 0.02}
 """Share of blocks that may be off, without shifts and with: 0.29 and 0.45 without a rehearsal. docs/realizer.md
 says what is left."""

@@ -147,6 +147,6 @@ def test_a_block_that_was_held_goes_on_the_same_if_it_is_planned_again(seed: int
     assert differences(story(seed), lambda: stage(FakeBody(pauses=True))) == []
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(share_of(6)))
 def test_so_it_does_with_the_simulated_body(seed: int) -> None:
     assert differences(story(seed), lambda: robot(Variability())) == []

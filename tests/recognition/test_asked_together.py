@@ -8,6 +8,7 @@ from engage_hri.schemas.behaviors import TurnSignal
 from engage_hri.schemas.recognition import ConnectionEvent, Interjection, SignalTurn
 from engage_hri.services.recognition.events.scene import Worded
 from engage_hri.services.recognition.statistics.tally import EventTally
+from tests.random_cases import share_of
 from tests.recognition.observations import ROBOT, Log, request_event, stamp
 
 PEOPLE = ("ann", "bob", "cy", "dan")
@@ -48,7 +49,7 @@ def asked(people: tuple[str, ...], speeches: list[tuple[float, float, str]]) -> 
     return log.events
 
 
-@pytest.mark.parametrize("seed", range(200))
+@pytest.mark.parametrize("seed", range(share_of(200)))
 def test_the_first_answer_is_that_of_all(seed: int) -> None:
     chance = random.Random(seed)
     people = tuple(chance.sample(PEOPLE, chance.randint(2, 4)))
@@ -76,7 +77,7 @@ def test_the_first_answer_is_that_of_all(seed: int) -> None:
         assert (asked_one == by) == (life[-1].duration is not None)
 
 
-@pytest.mark.parametrize("seed", range(50))
+@pytest.mark.parametrize("seed", range(share_of(50)))
 def test_of_several_answers_into_the_turn_the_first_is_that_of_who_is_silent(seed: int) -> None:
     chance = random.Random(seed)
     silent, *speak = chance.sample(PEOPLE, chance.randint(3, 4))

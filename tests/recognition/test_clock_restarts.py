@@ -6,6 +6,7 @@ import pytest
 
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.recognition.perceive.clock_restarts import IN_A_ROW, LATE, ClockRestarts
+from tests.random_cases import share_of
 
 
 def told(stamps: list[tuple[float, float]]) -> list[float]:
@@ -24,7 +25,7 @@ def test_after_a_jump_back_what_is_told_is_of_now(jump: float, lost: int) -> Non
     assert [at for at, time in enumerate(times) if abs(time - at) > 1e-9] == [*range(10, 10 + lost)]
 
 
-@pytest.mark.parametrize("seed", range(100))
+@pytest.mark.parametrize("seed", range(share_of(100)))
 def test_a_jump_back_is_noticed_at_any_rate(seed: int) -> None:
     """Also if fewer messages come than the jump is wide, and each takes a while, and some are late."""
     chance = random.Random(seed)
@@ -47,7 +48,7 @@ def test_a_jump_back_is_noticed_at_any_rate(seed: int) -> None:
     assert len(wrong) <= 2 * IN_A_ROW or wrong[-1] - wrong[0] <= jump + 2 * LATE
 
 
-@pytest.mark.parametrize("seed", range(100))
+@pytest.mark.parametrize("seed", range(share_of(100)))
 def test_messages_that_come_in_another_order_are_no_jump(seed: int) -> None:
     """Late by up to 2 s, each by another time."""
     chance = random.Random(seed)
@@ -62,7 +63,7 @@ def test_messages_that_come_in_another_order_are_no_jump(seed: int) -> None:
     assert told(stamps) == [seconds for _, seconds in stamps]
 
 
-@pytest.mark.parametrize("seed", range(100))
+@pytest.mark.parametrize("seed", range(share_of(100)))
 def test_messages_that_have_waited_for_a_link_are_no_jump(seed: int) -> None:
     """They come at once, or in some time, as a slow link lets them."""
     chance = random.Random(seed)

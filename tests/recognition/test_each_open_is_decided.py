@@ -28,6 +28,7 @@ from engage_hri.schemas.recognition import (
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.intake import EVENTS_KEPT, Intake
 from engage_hri.services.runtime.intake import Input, PublishMessage, StepClock
+from tests.random_cases import share_of
 from tests.recognition.observations import ROBOT, request_event, stamp
 
 END = 60.0
@@ -246,7 +247,7 @@ def drawn(seed: int) -> Meeting:
     return meeting
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(share_of(40)))
 def test_each_open_is_decided_once(seed: int) -> None:
     meeting = drawn(seed)
 
@@ -261,7 +262,7 @@ def test_each_open_is_decided_once(seed: int) -> None:
             assert changes <= CHANGES, (speech, readings)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(share_of(40)))
 def test_what_was_told_last_of_each_event_is_told_by_present_ids(seed: int) -> None:
     meeting = drawn(seed)
 

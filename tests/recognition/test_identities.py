@@ -41,6 +41,7 @@ from engage_hri.services.runtime.intake import (
     StepClock,
     WithdrawStates,
 )
+from tests.random_cases import share_of
 from tests.recognition.kept import kinds
 from tests.recognition.observations import PIECES, ROBOT, request_event, stamp, world
 from tests.simulation.party_play import Play
@@ -507,7 +508,7 @@ def last(play: Play) -> dict[str, ConnectionEvent]:
     return {each.id: each for each in play.events}
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(share_of(10)))
 @pytest.mark.parametrize("people", [1, 3])
 @pytest.mark.parametrize("by", ["word", "place"])
 def test_a_person_whose_id_changes_has_the_events_of_one_whose_id_does_not(people: int, seed: int, by: str) -> None:
@@ -534,7 +535,7 @@ def test_a_person_whose_id_changes_has_the_events_of_one_whose_id_does_not(peopl
     assert play.events == same.events
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(share_of(10)))
 def test_the_last_word_on_who_was_named_late_is_that_of_who_was_known_at_once(seed: int) -> None:
     play, same = Renamed(3, seed, (0.0,), lambda before, now: []), Renamed(3, seed, (0.0,), None)
     for each in (play, same):

@@ -7,6 +7,7 @@ import pytest
 
 from engage_hri.schemas.recognition import Interjection
 from engage_hri.services.recognition.events.scene import Worded
+from tests.random_cases import share_of
 from tests.recognition.observations import HUMAN, ROBOT, Log
 
 LIMIT = 0.8
@@ -98,7 +99,7 @@ def test_a_second_one_decides_the_first() -> None:
     assert found == [(3.0, "open", 3.0), (3.6, "open", 3.6), (3.0, "noise", 3.6), (3.6, "interruption", 4.1)]
 
 
-@pytest.mark.parametrize("seed", range(200))
+@pytest.mark.parametrize("seed", range(share_of(200)))
 def test_each_is_told_open_and_then_decided_in_time(seed: int) -> None:
     chance = random.Random(seed)
     worded, at, speeches = chance.random() < 0.5, 2.0, []

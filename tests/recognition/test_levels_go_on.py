@@ -20,6 +20,7 @@ from engage_hri.services.recognition.intake import Content, Intake, Output
 from engage_hri.services.recognition.statistics import published
 from engage_hri.services.recognition.statistics.published import TOGETHER, PublishedStatistics
 from engage_hri.services.runtime.intake import Input, PublishMessage, StepClock
+from tests.random_cases import share_of
 from tests.recognition.observations import HUMAN, ROBOT, stamp, world
 
 CONFIG = RecognitionConfig()
@@ -27,10 +28,10 @@ PEOPLE = ("ann", "bob")
 
 
 class Counted:
-    """Statistics, and what they keep for a next life."""
+    """Statistics, and what they keep for a next life. path: of the file; empty: there is none."""
 
-    def __init__(self, path: Path) -> None:
-        self._published, self._file = PublishedStatistics(ROBOT, CONFIG), FormerLife(str(path))
+    def __init__(self, path: str) -> None:
+        self._published, self._file = PublishedStatistics(ROBOT, CONFIG), FormerLife(path)
         for state in self._file.recall():
             if isinstance(state, Statistics):
                 self._published.resume(state, state.at.seconds)
@@ -78,13 +79,13 @@ def numbers(reasons: tuple[str, ...]) -> list[float]:
     return [float(each) for each in re.findall(r"\d+\.?\d*", " ".join(reasons))]
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(share_of(6)))
 def test_what_is_estimated_goes_on_as_without_the_restart(
     tmp_path: Path, seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(published, "TOLD_EVERY", 0.0)
     chance = random.Random(seed)
-    one, other, restarts = Counted(tmp_path / "one"), Counted(tmp_path / "other"), 0
+    one, other, restarts = Counted(""), Counted(f"{tmp_path}/other"), 0
     happens = news(random.Random(seed), 100.0)
     for number in range(150):
         now = 100.0 + number
@@ -93,7 +94,7 @@ def test_what_is_estimated_goes_on_as_without_the_restart(
             life.feed(changes, busy, now, **contacts)
             life.tell(now)
         if chance.random() < 0.1:
-            other = Counted(tmp_path / "other")
+            other = Counted(f"{tmp_path}/other")
             other.feed([], busy, now)
             restarts += 1
         left, right = one.tell(now + 0.5), other.tell(now + 0.5)

@@ -19,6 +19,7 @@ from engage_hri.services.recognition.events.session import Session
 from engage_hri.services.recognition.perceive.looks import Looking
 from engage_hri.services.recognition.perceive.manipulation import Manipulation
 from engage_hri.services.recognition.recognizer import Recognizer
+from tests.random_cases import share_of
 from tests.recognition.observations import ROBOT, request_event, stamp, world
 from tests.recognition.raw import pose, table, voice
 from tests.recognition.test_random_streams import Chance
@@ -194,7 +195,7 @@ def test_track_of_a_person_can_be_lost_from_outside():
     assert recognizer.lose_track("nobody", 11.0) == []
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", range(share_of(30)))
 def test_every_event_ends_and_every_request_is_answered_whatever_breaks(monkeypatch: pytest.MonkeyPatch, seed: int):
     chance = random.Random(seed)
     for name in ("gaze_changed", "begins", "tell", "leave", "pass_time"):

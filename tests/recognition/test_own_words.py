@@ -10,6 +10,7 @@ from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.recognition import Interjection
 from engage_hri.services.text.own_words import OwnWords
+from tests.random_cases import share_of
 from tests.recognition.observations import HUMAN, stamp
 from tests.recognition.test_words import Talk
 
@@ -146,7 +147,7 @@ def _spoken(random_: random.Random) -> list[tuple[str, float, float]]:
     return words
 
 
-@pytest.mark.parametrize("seed", range(200))
+@pytest.mark.parametrize("seed", range(share_of(200)))
 def test_what_comes_back_at_its_time_is_the_robots_and_what_comes_later_is_not(seed: int) -> None:
     random_ = random.Random(seed)
     spoken, own = _spoken(random_), OwnWords()

@@ -4,7 +4,7 @@ from collections import Counter
 
 import pytest
 
-from tests.recognition.phrases import PHRASES, Phrase
+from tests.recognition.phrases import PHRASES
 from tests.recognition.test_interjections import Said, told
 
 LONG = 1.2
@@ -20,11 +20,11 @@ def test_there_are_enough_of_each_kind() -> None:
 
 
 @pytest.mark.parametrize("lasts", [0.4, LONG])
-@pytest.mark.parametrize("phrase", PHRASES, ids=[f"{each.language}-{each.words}" for each in PHRASES])
-def test_it_is_read_as_it_is_meant(phrase: Phrase, lasts: float) -> None:
-    *_, (_, reading, at) = told(Said(3.0, lasts, phrase.words, lasts + 0.2), worded=True)
+@pytest.mark.parametrize(("language", "kind"), sorted({(each.language, each.kind) for each in PHRASES}))
+def test_it_is_read_as_it_is_meant(language: str, kind: str, lasts: float) -> None:
+    for phrase in [each for each in PHRASES if (each.language, each.kind) == (language, kind)]:
+        *_, (_, reading, at) = told(Said(3.0, lasts, phrase.words, lasts + 0.2), worded=True)
 
-    assert (reading == "interruption") == phrase.stops
-    if phrase.kind == "noise":
-        assert reading == "noise"
-    assert at <= 3.0 + 1.5
+        assert (reading == "interruption") == phrase.stops, phrase.words
+        assert kind != "noise" or reading == "noise", phrase.words
+        assert at <= 3.0 + 1.5, phrase.words

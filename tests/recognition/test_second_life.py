@@ -27,6 +27,7 @@ from engage_hri.services.recognition.former_life import FormerLife
 from engage_hri.services.recognition.statistics.tally import EventTally
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.service import running
+from tests.random_cases import share_of
 from tests.recognition.observations import HUMAN, ROBOT, world
 from tests.recognition.test_service import recognition
 
@@ -198,7 +199,7 @@ def test_who_is_forgotten_is_kept_no_longer(tmp_path: Path) -> None:
     assert [state.actor for state in FormerLife(str(path)).recall()] == ["bob"]
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(share_of(20)))
 def test_numbers_of_a_life_that_was_broken_off_are_those_of_one(seed: int) -> None:
     """But for the number of starts without maintenance, if maintenance caused the first of all."""
     chance = random.Random(seed)

@@ -28,6 +28,7 @@ from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime import ledger
 from engage_hri.services.runtime.service import running, serve
 from engage_hri.services.runtime.virtual_time import run_virtual
+from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody
 from tests.realizer.stage import stage
 from tests.realizer.test_plan_growth import tied_at_random
@@ -88,7 +89,7 @@ def of_story(tmp_path: Path, seed: int) -> Recording:
     return read(tmp_path / "a.mcap")
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(share_of(4)))
 def test_random_blocks_are_performed_the_same_in_both_lives(tmp_path: Path, seed: int) -> None:
     lives = again(of_story(tmp_path, seed), services=ONLY)
 

@@ -77,7 +77,7 @@ def test_a_known_mark_is_not_taken_for_an_offset() -> None:
     assert SyncRef.parse("s:word-2-1", names={"word-2"}) == SyncRef(behavior="s", sync="word-2", offset=-1)
 
 
-@settings(max_examples=share_of(200))
+@settings(max_examples=share_of(200, 20))
 @given(references())
 def test_the_canonical_text_of_a_reference_reads_back_equal(reference: SyncRef) -> None:
     assert SyncRef.parse(str(reference)) == reference
