@@ -3,10 +3,13 @@
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
+
+pytest.importorskip("starlette", reason="needs the extra `console`")
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
@@ -15,12 +18,16 @@ from engage_hri.schemas.sound import SoundFrame
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.people.perceive import perceive
+from engage_hri.services.console.web.sounds import unheard
+from engage_hri.services.perception.hearing.config import HearingConfig
+from engage_hri.services.perception.hearing.intake import LOOK_AROUND
 from engage_hri.services.perception.hearing.microphone import SILENT
 from engage_hri.services.perception.hearing.pages import MOST_PAGES
+from engage_hri.services.perception.hearing.service import hear
 from engage_hri.services.perception.hearing.voice import RATE, Samples
-from engage_hri.services.runtime.service import Ready
+from engage_hri.services.runtime.service import Ready, Service, running
 from tests.perception.spoken import placed, spoken, voice
-from tests.perception.test_hearing import Heard, hearing, sphinx
+from tests.perception.test_hearing import Heard, hearing, idle, sphinx
 
 FRAME = 512
 LONG = "move the purple triangle to the top"
@@ -68,12 +75,24 @@ async def test_the_voice_is_that_of_the_person_at_the_page_with_its_instants_and
     assert not heard.of(ActorLost, actor="visitor")
 
 
-async def test_sound_of_a_page_that_comes_too_early_is_not_taken_for_the_robots_voice(hub: MemoryHub):
-    """The robot speaks with a voice that does not tell what it plays: nobody is heard then, and that is told."""
+async def test_pages_are_heard_from_the_instant_on_at_which_hearing_listens_and_know_it(hub: MemoryHub):
+    """What is said to one that restarts slowly is told to be lost: the window asks whether anybody hears it."""
+    window = hub.join("console", role="wizard")
+    own: dict[str, Service] = {"hearing": partial(hear, config=HearingConfig(source="page"))}
+    async with running(hub, own):
+        await asyncio.sleep(10.0)
+        assert "not ready yet" in unheard(window, keys.sound("ann"))
+        async with running(hub, {"recognition": idle}):
+            await asyncio.sleep(LOOK_AROUND + 0.1)
+            assert not unheard(window, keys.sound("ann"))
+
+
+async def test_the_robots_voice_is_known_that_began_before_hearing_listened(hub: MemoryHub):
+    """It does not tell what it plays: nobody is heard then, and that is told."""
 
     async def speaks(bus: Bus, ready: Ready) -> None:
         ready()
-        await asyncio.sleep(1.0)
+        await asyncio.sleep(0.2)
         bus.publish(keys.ROBOT_ACTION, ActionBegan(actor=bus.robot, action="speak", at=bus.stamp()))
         await asyncio.get_running_loop().create_future()
 

@@ -37,6 +37,7 @@ class PageEars:
 
     async def listen(self, intake: HearingIntake) -> None:
         """Hear them for ever. One that gives nothing any more is told, and ends."""
+        intake.widen(keys.ANY_SOUND)
         while True:
             until = min((page.came for page in self._pages.values()), default=float("inf")) + SILENT
             received = await intake.inbox.next(until)
