@@ -13,6 +13,8 @@ import aiohttp
 import pytest
 
 from engage_hri.services.bus.zenoh.hub import open_hub
+from engage_hri.services.perception.hearing.config import HearingConfig
+from engage_hri.services.runtime.settings import tell_settings
 from tests.bus.places import free_endpoint
 from tests.console import browser
 from tests.console.browser import Page, waited
@@ -367,12 +369,36 @@ async def test_what_becomes_of_who_does_nothing_and_what_a_visitor_is_told_first
 
 
 @needs_browser
+async def test_who_looks_at_the_pieces_is_at_the_table_and_not_elsewhere(place: Place) -> None:
+    part = "import('./stage/visit.js').then(({ part }) => part(%s, %s, 'ann').level)"
+    things = [{"id": "cup", "kind": "object"}, {"id": "left", "kind": "hand"}]
+
+    def shown(level: str, *looks: str) -> str:
+        scene = {"things": things, "people": [{"id": "ann", "looks": looks}]}
+        return part % (json.dumps({"levels": [{"actor": "ann", "level": level, "value": 0.1}]}), json.dumps(scene))
+
+    async with opened(place) as page:
+        for level in ("disengaging", "disengaged"):
+            for looks, told in ((("cup",), "occupied"), (("left",), level), ((), level), (("robot",), level)):
+                assert await page.value(shown(level, *looks)) == told
+        assert await page.value(shown("engaged", "cup")) == "engaged"
+        assert await page.value(part % ("null", "null")) == "unknown"
+
+        await sit(page)
+        await page.value("window.stage.send({ do: 'look', target: 'table' });0")
+        words = "document.querySelector('.who .level').textContent"
+        await page.until(f"{words} === 'are at the table'", 60)
+
+
+@needs_browser
 async def test_nobody_is_told_to_press_a_microphone_that_was_just_not_to_be_had(place: Place) -> None:
     hint = "document.querySelector('.hint').textContent"
     none = "navigator.mediaDevices.getUserMedia = async () => { throw new DOMException('no', 'NotFoundError'); };"
     async with await open_hub("robot", connect=(place.endpoint,)) as hub, opened(place) as page:
-        hub.join("hearing", "perception").declare_alive()
-        await page.until("window.stage.state.talk.hears")
+        ears = hub.join("hearing", "perception")
+        tell_settings(ears, "hearing", HearingConfig(recognizer="sphinx"))
+        ears.declare_alive()
+        await page.until("window.stage.state.talk.hears === 'words'")
         await sit(page)
         await page.value(f"{none};0")
         await press(page, ".hold")
@@ -387,6 +413,33 @@ async def test_nobody_is_told_to_press_a_microphone_that_was_just_not_to_be_had(
         await press(page, ".hold")
         await page.value(LATER % 13_000)
         await page.until(f"{hint} === 'Press the microphone, and talk.'")
+
+
+@needs_browser
+async def test_where_no_words_are_understood_a_visitor_is_told_to_type_in_both_languages(place: Place) -> None:
+    hint = "document.querySelector('.hint').textContent"
+    async with await open_hub("robot", connect=(place.endpoint,)) as hub, opened(place) as page:
+        ears = hub.join("hearing", "perception")
+        tell_settings(ears, "hearing", HearingConfig())
+        ears.declare_alive()
+        await sit(page)
+        await page.until("window.stage.state.talk.hears === 'voices'")
+        await page.value(LATER % 13_000)
+        await page.until(f"{hint}.startsWith('Type your words: ')")
+        assert await page.value(OUTSIDE) == []
+        await press(page, ".other")
+        await page.until(f"{hint}.startsWith('Schreib deine Worte auf Englisch: ')")
+        assert await page.value(OUTSIDE) == []
+
+
+@needs_browser
+async def test_who_reads_another_language_is_told_in_which_one_the_robot_understands(place: Place) -> None:
+    said = "import('./stage/words.js').then(({ texts }) => texts('%s', '%s').tips('%s', 'none')[0])"
+    async with opened(place) as page:
+        assert await page.value(said % ("en", "en-GB", "on")) == "Just talk: the robot hears you."
+        assert "auf Englisch" in await page.value(said % ("de", "en", "on"))
+        assert "auf Englisch" in await page.value(said % ("de", "en", "off"))
+        assert "in German" in await page.value(said % ("en", "de-AT", "off"))
 
 
 @needs_browser

@@ -4,7 +4,7 @@ import { bar as bars } from "./bar.js";
 import { heads as atHeads } from "./heads.js";
 import { scene as space } from "./scene.js";
 import { touch as hands } from "./touch.js";
-import { moment, visit } from "./visit.js";
+import { moment, part, visit } from "./visit.js";
 import { another, language, texts } from "./words.js";
 
 const TOLD = 4; // seconds for which news of an order are shown
@@ -81,7 +81,7 @@ function tell() {
   const present = scene?.people.filter((each) => each.at && each.present && each.id !== person) ?? [];
   bar.take({
     person, denied: state.denied, ready: talk?.state === "ready" && !state.link && Boolean(scene?.body), company: present.map(({ id }) => id),
-    measure: talk?.levels.find(({ actor }) => actor === person), speaks: isTalking(), hears: talk?.hears, sees: talk?.sees,
+    part: part(talk, scene, person), speaks: isTalking(), hears: talk?.hears, sees: talk?.sees,
   });
   document.body.classList.toggle("seated", Boolean(person));
   if (shown && scene) shown.take(scene, person);
@@ -180,7 +180,7 @@ function hint(now) {
   const next = visit(now - idle, { seated: true, kiosk: isKiosk, touched });
   const tips = text.tips(bar.ear, bar.eye);
   if (next.do === "tip" && [undefined, "mutual", "meet"].includes(met?.text)) return tips[next.number % tips.length];
-  if (met?.text === "looking" && ["off", "lacking"].includes(bar.ear)) return tips[0];
+  if (met?.text === "looking" && ["off", "lacking", "wordless"].includes(bar.ear)) return tips[0];
   if (met) return typeof text[met.text] === "function" ? text[met.text](named(met.about)) : text[met.text];
   return tips[0];
 }

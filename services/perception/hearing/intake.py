@@ -5,7 +5,6 @@ it, and what is said to it is not lost unseen."""
 
 from collections.abc import Iterable
 
-from engage_hri.schemas import keys
 from engage_hri.schemas.participants import PeerAlive
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Received
