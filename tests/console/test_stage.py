@@ -13,6 +13,7 @@ import aiohttp
 import pytest
 
 from engage_hri.services.bus.zenoh.hub import open_hub
+from engage_hri.services.console.web.sessions import RELOADED
 from engage_hri.services.perception.hearing.config import HearingConfig
 from engage_hri.services.runtime.settings import tell_settings
 from tests.bus.places import free_endpoint
@@ -337,6 +338,29 @@ async def test_what_a_visitor_has_said_is_read_out_to_them_and_not_to_the_next(p
         async with opened(place) as other:
             await other.until("window.stage.state.talk.bubbles.some(({ words }) => words.includes('Xaver'))")
             assert await other.value(read) == ""
+
+
+@needs_browser
+async def test_a_page_that_takes_long_to_load_anew_has_its_seat_again_or_says_that_it_is_lost(place: Place) -> None:
+    """The 3D library alone, a megabyte, takes longer than a page that goes has to come back."""
+    slow = {"offline": False, "latency": 20, "downloadThroughput": 60_000, "uploadThroughput": 60_000}
+    async with opened(place) as page:
+        await sit(page)
+        person = await page.value(PERSON)
+        await page.call("Network.setCacheDisabled", cacheDisabled=True)
+        await page.call("Network.emulateNetworkConditions", **slow)
+        began = asyncio.get_running_loop().time()
+        await page.call("Page.reload")
+        await page.until("window.stage && window.stage.state.talk", 90)
+        assert asyncio.get_running_loop().time() - began > RELOADED + 1.0
+        assert await page.value(PERSON) == person
+
+        await page.call("Network.emulateNetworkConditions", **slow | {"downloadThroughput": -1})
+        await page.go("about:blank")
+        await asyncio.sleep(RELOADED + 1.0)
+        await page.go(place.stage)
+        await page.until("document.querySelector('.hint').textContent.startsWith('You were away for a moment')")
+        assert not await page.value(PERSON)
 
 
 @needs_browser

@@ -8,11 +8,14 @@ import { moment, part, visit } from "./visit.js";
 import { another, language, texts } from "./words.js";
 
 const TOLD = 4; // seconds for which news of an order are shown
+const GONE = 12; // and that one has lost the seat
+const SEAT = `engage-seat ${location.pathname}`; // who one is, while the page is loaded anew
 const at = (what) => document.querySelector(what);
 const asked = new URLSearchParams(location.search);
 const isKiosk = asked.has("kiosk");
 const { language: robotSpeaks, examples } = document.body.dataset;
-const state = { robot: document.body.dataset.robot, person: "", scene: null, talk: null, text: null, denied: "", link: "" };
+const state = { robot: document.body.dataset.robot, person: sessionStorage.getItem(SEAT) ?? "", scene: null, talk: null, text: null, denied: "", link: "" };
+sessionStorage.removeItem(SEAT);
 const clock = () => performance.now() / 1000;
 
 let spoken = asked.get("lang") ?? (isKiosk ? null : localStorage.getItem("engage-language"));
@@ -105,7 +108,6 @@ function readOut(isBefore) {
 
 let offset = null; // from our clock to seconds of the picture
 const link = follow({
-  place: "stage/frames",
   take(frame, isFirst) {
     const behind = clock() - frame.now;
     offset = offset === null || isFirst || behind < offset ? behind : offset + (behind - offset) * 0.002; // frames come late, never early
@@ -113,7 +115,7 @@ const link = follow({
     if (frame.sections?.scene) state.scene = frame.sections.scene;
     if (frame.sections?.talk) state.talk = frame.sections.talk;
     if (frame.you) {
-      if (state.person && !frame.you.person && isFirst) note(state.text.gone);
+      if (state.person && !frame.you.person && isFirst) note(state.text.gone, GONE);
       if (state.person !== (frame.you.person ?? "")) at(".read").replaceChildren();
       state.person = frame.you.person ?? "";
       state.denied = frame.you.denied?.seat ?? "";
@@ -133,9 +135,10 @@ const link = follow({
   wait() {},
 });
 
-function note(text) {
-  news = { text, until: clock() + TOLD };
+function note(text, stays = TOLD) {
+  news = { text, until: clock() + stays };
 }
+addEventListener("pagehide", () => state.person && sessionStorage.setItem(SEAT, state.person));
 function refuse(told) {
   bar.rise();
   note(told.some(({ text }) => text.includes("on its way")) ? state.text.busy : state.text.refused);
@@ -198,6 +201,7 @@ function tick() {
   if (next.do === "anew") {
     touched = false;
     link.end();
+    state.person = ""; // it is the next visitor's page
     location.replace(`${location.pathname}?kiosk`);
     return;
   }
