@@ -42,17 +42,29 @@ async def pages(hub: MemoryHub, **settings: Any) -> AsyncIterator[tuple[Heard, B
 
 
 async def send(
-    window: Bus, person: str, samples: Samples, *, lost: range = range(0), ends: bool = True, late: float = 0.05
+    window: Bus,
+    person: str,
+    samples: Samples,
+    *,
+    lost: range = range(0),
+    jumps: int | None = None,
+    ends: bool = True,
+    late: float = 0.05,
 ) -> float:
-    """Send sound as a page does. lost: numbers of frames that do not come. Returns the loop time of its second 0."""
+    """Send sound as a page does. Returns the loop time of its second 0.
+
+    lost: numbers of frames that do not come. jumps: number of the frame from which on its clock is 0.3 s behind.
+    """
     begin = window.now()
     for number in range(len(samples) // FRAME):
         at = begin + number * FRAME / RATE
         await asyncio.sleep(at + FRAME / RATE + late - window.now())
         content = samples[number * FRAME : (number + 1) * FRAME].astype("<i2").tobytes()
+        behind = 0.0 if jumps is None or number < jumps else 0.3
         if number not in lost:
             window.publish(
-                keys.sound(person), SoundFrame(at=window.stamp(at), rate=RATE, samples=content, number=number + 1)
+                keys.sound(person),
+                SoundFrame(at=window.stamp(at - behind), rate=RATE, samples=content, number=number + 1),
             )
     if ends:
         window.publish(keys.sound(person), SoundFrame(at=window.stamp(), rate=RATE, number=len(samples) // FRAME + 1))
@@ -163,6 +175,17 @@ async def test_sound_that_is_lost_is_told_once_and_a_gap_ends_the_speech(hub: Me
         assert [fault.reason for fault in heard.of(Fault)] == ["sound from the microphone of ann is lost on its way"]
         await send(window, "ann", said.samples, lost=range(middle, middle + 10))
         assert len(heard.speeches) == 3
+
+
+async def test_a_clock_that_jumps_ends_the_speech_and_that_is_told(hub: MemoryHub):
+    said = spoken(LONG)
+    middle = round((said.since + said.until) / 2 * RATE / FRAME)
+
+    async with pages(hub) as (heard, window), perceive("ann", hub=hub):
+        await send(window, "ann", said.samples, jumps=middle)
+        assert len(heard.speeches) == 2
+        [fault] = heard.of(Fault)
+        assert fault.reason == "a speech of ann has ended where some of its sound is missing"
 
 
 async def test_a_flood_of_microphones_is_bounded_and_what_is_no_sound_of_ours_is_told(hub: MemoryHub):
