@@ -49,7 +49,7 @@ def test_what_is_no_wav_file_of_16_bits_is_refused_with_what_to_do():
 
 def test_a_file_that_ends_before_its_end_is_refused_unless_nobody_knew_where_that_would_be():
     whole = written()
-    with pytest.raises(InputRefused, match="it ends after .* s, and says that it has .* s of sound") as refused:
+    with pytest.raises(InputRefused, match=r"it ends after .* s, and says that it has .* s of sound") as refused:
         read_wav(io.BytesIO(whole[:-20]), "a.wav")
     assert "ffmpeg" in refused.value.fault.advice
     for length in (2**32 - 1, 2**31, 2**31 - 1):
