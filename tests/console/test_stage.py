@@ -3,6 +3,7 @@
 import asyncio
 import importlib.util
 import json
+import signal
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from importlib import resources
@@ -361,6 +362,24 @@ async def test_a_page_that_takes_long_to_load_anew_has_its_seat_again_or_says_th
         await page.go(place.stage)
         await page.until("document.querySelector('.hint').textContent.startsWith('You were away for a moment')")
         assert not await page.value(PERSON)
+
+
+@needs_browser
+async def test_a_window_that_is_shut_is_told_as_that_and_one_that_is_killed_as_a_link_that_is_lost(
+    place: Place, tmp_path: Path
+) -> None:
+    hint = "document.querySelector('.hint').textContent"
+    for how, told in ((signal.SIGINT, "The robot was switched off."), (signal.SIGKILL, "No link to the robot.")):
+        folder = tmp_path / how.name
+        with engage(folder, "console", "--connect", place.endpoint, "--port", "0", "--role", "wizard") as window:
+            stage = waited(window, folder, STAGE)
+            async with browser.at_port(place.port) as running, running.page() as page:
+                await page.go(stage)
+                await page.until("window.stage.state.talk")
+                window.send_signal(how)
+                await page.until(f"{hint}.startsWith('{told}')")
+                await asyncio.sleep(5.0)  # it tries again meanwhile
+                assert (await page.value(hint)).startswith(told)
 
 
 @needs_browser

@@ -1,5 +1,5 @@
 // The stage: what a visitor sees of the robot, and how they sit down and talk with it.
-import { follow } from "../page/link.js";
+import { ENDED, follow } from "../page/link.js";
 import { bar as bars } from "./bar.js";
 import { heads as atHeads } from "./heads.js";
 import { scene as space } from "./scene.js";
@@ -126,7 +126,7 @@ const link = follow({
     document.body.dataset.frames = Number(document.body.dataset.frames ?? 0) + 1;
   },
   tell(isThere, reason = "") {
-    const now = isThere ? "" : reason ? "full" : "lost";
+    const now = isThere ? "" : reason === ENDED ? "ended" : reason ? "full" : "lost";
     if (state.link === now) return;
     state.link = now;
     tell();

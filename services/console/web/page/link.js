@@ -8,6 +8,8 @@ const LOOK = 250; // ms between two looks at how the link is
 const SILENCE = 16; // looks without any frame after which the window is away
 const DEAD = 60; // looks without any frame after which the link is given up: that of a computer that changes its network never ends by itself
 const NOTED = 0.5; // seconds after which an order without an answer is shown
+const SHUTS = 1012; // code of RFC 6455 with which a window ends the links of all pages as it is shut
+export const ENDED = "the window has ended"; // the reason in this case, until there is a window again
 const LEAVES = 4001; // code with which the link of a page ends that may be loaded anew: its session stays for a while
 const OVER = 1000; // and of one that is over: its session ends
 const clock = () => Date.now() / 1000; // goes on while a computer sleeps
@@ -55,7 +57,7 @@ export function follow({ take, tell, report, wait }) {
     };
     own.onclose = (event) => {
       if (ended || own !== socket) return;
-      reason = event.reason;
+      reason = event.code === SHUTS || reason === ENDED ? ENDED : event.reason;
       last = null;
       if (reason) tell(false, reason);
       setTimeout(() => own === socket && open(), AGAIN);
