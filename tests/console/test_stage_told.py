@@ -22,6 +22,8 @@ pytestmark = [
     pytest.mark.real_time,
     pytest.mark.skipif(importlib.util.find_spec("starlette") is None, reason="the extra `console` is not installed"),
 ]
+PASSES = "new Promise((done) => setTimeout(done, %d))"
+"""Let time pass in the page, in milliseconds."""
 
 
 @needs_browser
@@ -41,7 +43,7 @@ async def test_a_page_that_takes_long_to_load_anew_has_its_seat_again_or_says_th
 
         await page.call("Network.emulateNetworkConditions", **slow | {"downloadThroughput": -1})
         await page.go("about:blank")
-        await asyncio.sleep(RELOADED + 1.0)
+        await page.value(PASSES % (1000 * (RELOADED + 1.0)))
         await page.go(place.stage)
         await page.until("document.querySelector('.hint').textContent.startsWith('You were away for a moment')")
         assert not await page.value(PERSON)
@@ -61,7 +63,7 @@ async def test_a_window_that_is_shut_is_told_as_that_and_one_that_is_killed_as_a
                 await page.until("window.stage.state.talk")
                 window.send_signal(how)
                 await page.until(f"{hint}.startsWith('{told}')")
-                await asyncio.sleep(5.0)  # it tries again meanwhile
+                await page.value(PASSES % 5000)  # it tries again meanwhile
                 assert (await page.value(hint)).startswith(told)
 
 
