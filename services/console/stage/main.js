@@ -8,7 +8,6 @@ import { moment, part, visit } from "./visit.js";
 import { another, language, texts } from "./words.js";
 
 const TOLD = 4; // seconds for which news of an order are shown
-const GONE = 12; // and that one has lost the seat
 const SEAT = `engage-seat ${location.pathname}`; // who one is, while the page is loaded anew
 const at = (what) => document.querySelector(what);
 const asked = new URLSearchParams(location.search);
@@ -115,9 +114,10 @@ const link = follow({
     if (frame.sections?.scene) state.scene = frame.sections.scene;
     if (frame.sections?.talk) state.talk = frame.sections.talk;
     if (frame.you) {
-      if (state.person && !frame.you.person && isFirst) note(state.text.gone, GONE);
+      if (state.person && !frame.you.person && isFirst) note(state.text.gone, Infinity);
       if (state.person !== (frame.you.person ?? "")) at(".read").replaceChildren();
       state.person = frame.you.person ?? "";
+      if (state.person && news.until === Infinity) note("", 0); // they sit again
       state.denied = frame.you.denied?.seat ?? "";
     }
     if (frame.told?.length) refuse(frame.told);
@@ -135,8 +135,8 @@ const link = follow({
   wait() {},
 });
 
-function note(text, stays = TOLD) {
-  news = { text, until: clock() + stays };
+function note(text, until = clock() + TOLD) {
+  news = { text, until };
 }
 addEventListener("pagehide", () => state.person && sessionStorage.setItem(SEAT, state.person));
 function refuse(told) {
