@@ -185,6 +185,7 @@ def _looks(role: str, *more: str) -> Iterator[Row]:
         keys.ROBOT_ONGOING,
         keys.ANY_PERCEIVED_ONGOING,
         keys.ROBOT_SOUND,
+        keys.settings("hearing"),
         *more,
     )
     yield from (Row(role, "subscribes", key, "shown by `engage console`") for key in shown)

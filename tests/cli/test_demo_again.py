@@ -63,6 +63,21 @@ async def test_a_kiosk_begins_anew_when_its_visitor_has_left_and_not_before_one_
     assert visits.began == [0.0, pytest.approx(110.0 + EMPTY, abs=1.0)]
 
 
+async def test_a_machine_that_stands_still_does_not_let_a_kiosks_visitor_go() -> None:
+    visits, stood = Visits(), 0.0
+    now = visits.bus.now
+    visits.bus.now = lambda: now() + stood
+    shown = visits.shown(again=True, kiosk=True)
+    visits.picture.present = ("ann",)
+    await asyncio.sleep(10.0)
+    stood = EMPTY + 1.0
+    await asyncio.sleep(10.0)
+    shown.cancel()
+    await asyncio.wait([shown])
+
+    assert visits.began == [0.0]
+
+
 async def test_one_that_is_recorded_ends_with_the_goodbye() -> None:
     visits = Visits()
     shown = visits.shown(again=False, kiosk=False)

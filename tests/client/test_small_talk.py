@@ -117,6 +117,20 @@ async def test_who_says_nothing_is_offered_help_and_then_left_in_peace() -> None
     ]
 
 
+async def test_two_who_say_nothing_are_both_greeted_and_hear_all_else_once() -> None:
+    async with talking() as going, perceive("ann", hub=going.robot.hub) as ann:
+        await ann.look_at(ann.robot)
+        await asyncio.sleep(4)
+        async with perceive("ben", hub=going.robot.hub) as ben:
+            await ben.look_at(ben.robot)
+            await asyncio.sleep(200)
+
+    greeting, *others = [spoken(line) for _, line in SILENCE]
+    told = " ".join(going.turns)
+    assert told.count(greeting.removesuffix(" How are you?")) == 2
+    assert [told.count(line) for line in others] == [1] * len(others)
+
+
 async def test_each_of_two_is_answered_and_who_has_gone_is_not() -> None:
     async with talking() as going, perceive("ann", hub=going.robot.hub) as ann:
         async with perceive("ben", hub=going.robot.hub) as ben:

@@ -3,12 +3,14 @@
 import asyncio
 import importlib.util
 import os
+import random
 import signal
 import time
 import wave
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -20,6 +22,7 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.zenoh.hub import open_hub
 from tests.console import browser
 from tests.console.browser import Page
+from tests.console.cutting import Cutter
 from tests.console.tapped import press
 from tests.console.windows import HeardPlace, heard_place
 
@@ -251,6 +254,36 @@ async def test_a_page_that_is_hidden_hears_nobody_and_says_so(place: HeardPlace)
         await one.says("went off as this page was hidden")
 
         assert await one.is_off
+
+
+@asynccontextmanager
+async def cuttable(place: HeardPlace) -> AsyncIterator[tuple[HeardPlace, Cutter]]:
+    """The same place, behind a proxy whose links are cut."""
+    cutter = Cutter(urlsplit(place.url).port or 0, random.Random(1))
+    async with await asyncio.start_server(cutter.serve, "127.0.0.1", 0) as server:
+        port = server.sockets[0].getsockname()[1]
+        try:
+            yield place._replace(url=place.url.replace(f":{urlsplit(place.url).port}", f":{port}")), cutter
+        finally:
+            await cutter.end()
+
+
+async def test_a_link_that_breaks_for_a_moment_is_made_again_and_the_microphone_stays_on(place: HeardPlace) -> None:
+    async with cuttable(place) as (behind, cutter), sitting(behind) as one:
+        await one.press()
+        await one.is_on()
+        await one.got(30)
+        cutter.is_down = True
+        cutter.cut()
+        await one.ended()
+        await one.says("does not answer", 4.0)
+        cutter.is_down = False
+        count = len(one.frames)
+        await one.got(count + 30)
+
+        assert not await one.is_off
+        await one.says("of your voice were lost")
+        assert all(frame.samples for _, frame in one.frames[count:])
 
 
 async def test_a_window_that_stands_still_is_told_and_what_was_lost(place: HeardPlace) -> None:

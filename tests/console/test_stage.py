@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import aiohttp
 import pytest
 
-from engage_hri.services.bus.zenoh.hub import open_hub
 from tests.bus.places import free_endpoint
 from tests.console import browser
 from tests.console.browser import Page, waited
@@ -364,71 +363,6 @@ async def test_what_becomes_of_who_does_nothing_and_what_a_visitor_is_told_first
             talk((), {**pair, "to": "ben"}): "", talk((), {**pair, "met": True}): "",
         }  # fmt: skip
         assert {case: await page.value(seen % case) for case in cases} == cases
-
-
-@needs_browser
-async def test_nobody_is_told_to_press_a_microphone_that_was_just_not_to_be_had(place: Place) -> None:
-    hint = "document.querySelector('.hint').textContent"
-    none = "navigator.mediaDevices.getUserMedia = async () => { throw new DOMException('no', 'NotFoundError'); };"
-    async with await open_hub("robot", connect=(place.endpoint,)) as hub, opened(place) as page:
-        hub.join("hearing", "perception").declare_alive()
-        await page.until("window.stage.state.talk.hears")
-        await sit(page)
-        await page.value(f"{none};0")
-        await press(page, ".hold")
-        await page.until(f"{hint}.includes('none is plugged in')")
-        await page.value(LATER % 13_000)
-        await page.until(f"!{hint}.includes('none is plugged in')")
-        assert await page.value(hint) == "Type what you want to say."
-
-        await page.value("void (navigator.mediaDevices.getUserMedia = () => new Promise(() => {}))")
-        await press(page, ".hold")
-        await page.until(f"{hint}.includes('asks you')")
-        await press(page, ".hold")
-        await page.value(LATER % 13_000)
-        await page.until(f"{hint} === 'Press the microphone, and talk.'")
-
-
-@needs_browser
-async def test_the_camera_is_offered_where_the_robot_sees_and_says_why_there_is_none(place: Place) -> None:
-    hint, button = "document.querySelector('.hint').textContent", "document.querySelector('.see')"
-    none = "navigator.mediaDevices.getUserMedia = async () => { throw new DOMException('no', 'NotFoundError'); };"
-    async with await open_hub("robot", connect=(place.endpoint,)) as hub, opened(place) as page:
-        await sit(page)
-        assert await page.value(f"{button}.hidden")
-        hub.join("eyes", "perception").declare_alive()
-        await page.until(f"!{button}.hidden")
-        await page.value(f"{none};0")
-        await press(page, ".see")
-        await page.until(f"{hint}.startsWith('The camera is off:') && {hint}.includes('none is plugged in')")
-        await press(page, ".other")
-        await page.until(f"{hint}.startsWith('Die Kamera ist aus:')")
-        assert await page.value(f"{button}.getAttribute('aria-pressed')") == "false"
-
-
-@needs_browser
-async def test_nobody_is_told_to_press_a_camera_that_ended_by_itself(place: Place) -> None:
-    hint = "document.querySelector('.hint').textContent"
-    blind = """void (navigator.mediaDevices.getUserMedia = async () => {
-      const made = document.createElement('canvas');
-      made.getContext('2d');
-      return made.captureStream(5);
-    }, window.Worker = class {
-      postMessage() { setTimeout(() => this.onmessage({ data: { ended: 'models' } })); }
-      addEventListener() {}
-      terminate() {}
-    })"""
-    async with await open_hub("robot", connect=(place.endpoint,)) as hub, opened(place) as page:
-        hub.join("eyes", "perception").declare_alive()
-        await page.until("window.stage.state.talk.sees")
-        await sit(page)
-        await page.until(f"{hint} === 'Press the camera, and the robot sees where you look.'")
-        await page.value(blind)
-        await press(page, ".see")
-        await page.until(f"{hint}.includes('not installed')")
-        await page.value(LATER % 13_000)
-        await page.until(f"!{hint}.includes('not installed')")
-        assert await page.value(hint) == "Touch a piece to look at it."
 
 
 @needs_browser

@@ -3,7 +3,7 @@
 import json
 from typing import Any
 
-from engage_hri.schemas.participants import PeerAlive, PeerGone
+from engage_hri.schemas.participants import PeerAlive, PeerGone, ServiceSettings
 from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import Statistics, WindowStatistics
 from engage_hri.services.console.web import orders, sections
@@ -20,6 +20,7 @@ def told(**more: Any) -> Any:
     health = [sections.Health(name, True, True, True, (), ()) for name in SERVICES]
     nothing: dict[str, Any] = {
         "words": (), "floor": (), "events": (), "measures": (), "health": health, "held": False, "reporters": {},
+        "understands": False,
     }  # fmt: skip
     return talk(**nothing | more)
 
@@ -126,7 +127,25 @@ def test_a_visitor_of_the_stage_sits_down_and_does_no_more_whatever_the_role_of_
     assert set(orders.denied("wizard", False, stage=True)) == set(orders.ALL_RIGHTS)
 
 
-def test_it_hears_while_hearing_is_on_the_bus() -> None:
-    ears = sections.Health("hearing", False, True, True, (), ())
+def test_it_hears_while_hearing_is_on_the_bus_and_words_if_somebody_understands_them() -> None:
+    made = picture()
+    face = StageFace(made)
 
-    assert [told().hears, told(health=[ears]).hears] == [False, True]
+    def hears() -> str:
+        return str(json.loads(face.section("talk"))["hears"]) if face.versions["talk"] else ""
+
+    def settings(text: str, participant: str = "hearing") -> None:
+        told = ServiceSettings(participant=participant, run=RUN, version="1", at=at(10.0), settings=text)
+        made.feed(told, 10.0, 10.0)
+
+    assert hears() == ""
+    made.feed(PeerAlive(participant="hearing", run=RUN), 10.0, 10.0)
+    assert hears() == "voices"
+    settings('{"hearing": {"recognizer": "sphinx"}}')
+    assert hears() == "words"
+    for text in ('{"hearing": {"recognizer": ""}}', '{"hearing": 3}', "no JSON"):
+        settings(text)
+        assert hears() == "voices"
+    settings('{"hearing": {"recognizer": "sphinx"}}')
+    made.feed(PeerGone(participant="hearing"), 10.0, 10.0)
+    assert hears() == ""

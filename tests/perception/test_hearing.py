@@ -14,7 +14,7 @@ import pytest
 from engage_hri import embedded
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, Utterance
+from engage_hri.schemas.perception import LONGEST_TEXT, ActionBegan, ActionEnded, ActorFound, ActorLost, Utterance
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus
@@ -29,7 +29,7 @@ from engage_hri.services.perception.hearing.recognizing import Listening, Speech
 from engage_hri.services.perception.hearing.service import hear
 from engage_hri.services.perception.hearing.sound import Piece
 from engage_hri.services.perception.hearing.speeches import VISITOR
-from engage_hri.services.perception.hearing.voice import RATE
+from engage_hri.services.perception.hearing.voice import LONGEST, RATE
 from engage_hri.services.runtime.service import Ready, Service, running
 from tests.perception.spoken import PHRASES, placed, spoken, voice, write_wav
 
@@ -284,6 +284,46 @@ async def test_a_recognizer_that_fails_is_told_and_the_speech_has_no_words(
     assert partial_ones
     assert not any(each.final for each in partial_ones)
     assert [fault.reason for fault in heard.of(Fault)] == ["the recognizer fails: RuntimeError: out of memory"]
+
+
+class TalkativeListening(Listening):
+    def hear(self, samples: Any) -> str:
+        return ""
+
+    def end(self) -> SpeechWords:
+        return SpeechWords("word " * 1000)
+
+
+class Talkative(SpeechRecognizer):
+    def listen(self) -> Listening:
+        return TalkativeListening()
+
+
+async def test_more_words_than_an_utterance_takes_are_left_out_and_that_is_told(
+    hub: MemoryHub, tmp_path: Path, install: Any
+):
+    install("acme-ears", "[engage.recognizers]\nodd = acme_ears:Talkative\n",
+            acme_ears="from tests.perception.test_hearing import Talkative\n")  # fmt: skip
+    path = write_wav(tmp_path / "said.wav", spoken("yes").samples)
+
+    async with hearing(hub, source=str(path), recognizer="odd") as heard:
+        await heard.over.wait()
+
+    assert len(heard.of(Utterance)[-1].text) == LONGEST_TEXT
+    assert [fault.reason for fault in heard.of(Fault)] == [
+        f"a speech of 4999 letters: those after the first {LONGEST_TEXT} are left out"
+    ]
+
+
+async def test_a_voice_without_a_pause_is_several_speeches_and_that_is_told_once(hub: MemoryHub, tmp_path: Path):
+    said = voice("which one do you want to have and which one do you want to see")
+    path = write_wav(tmp_path / "said.wav", np.tile(said, round(2.5 * LONGEST * RATE / len(said))))
+
+    async with hearing(hub, source=str(path), pause=2.0) as heard:
+        await heard.over.wait()
+
+    assert len(heard.speeches) == 3
+    assert ["goes on for 30 s without a pause" in fault.reason for fault in heard.of(Fault)] == [True]
 
 
 @pytest.mark.parametrize(

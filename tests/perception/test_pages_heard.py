@@ -3,10 +3,13 @@
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
+
+pytest.importorskip("starlette", reason="needs the extra `console`")
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
@@ -15,12 +18,16 @@ from engage_hri.schemas.sound import SoundFrame
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.people.perceive import perceive
+from engage_hri.services.console.web.sounds import unheard
+from engage_hri.services.perception.hearing.config import HearingConfig
+from engage_hri.services.perception.hearing.intake import LOOK_AROUND
 from engage_hri.services.perception.hearing.microphone import SILENT
 from engage_hri.services.perception.hearing.pages import MOST_PAGES
+from engage_hri.services.perception.hearing.service import hear
 from engage_hri.services.perception.hearing.voice import RATE, Samples
-from engage_hri.services.runtime.service import Ready
+from engage_hri.services.runtime.service import Ready, Service, running
 from tests.perception.spoken import placed, spoken, voice
-from tests.perception.test_hearing import Heard, hearing, sphinx
+from tests.perception.test_hearing import Heard, hearing, idle, sphinx
 
 FRAME = 512
 LONG = "move the purple triangle to the top"
@@ -35,17 +42,29 @@ async def pages(hub: MemoryHub, **settings: Any) -> AsyncIterator[tuple[Heard, B
 
 
 async def send(
-    window: Bus, person: str, samples: Samples, *, lost: range = range(0), ends: bool = True, late: float = 0.05
+    window: Bus,
+    person: str,
+    samples: Samples,
+    *,
+    lost: range = range(0),
+    jumps: int | None = None,
+    ends: bool = True,
+    late: float = 0.05,
 ) -> float:
-    """Send sound as a page does. lost: numbers of frames that do not come. Returns the loop time of its second 0."""
+    """Send sound as a page does. Returns the loop time of its second 0.
+
+    lost: numbers of frames that do not come. jumps: number of the frame from which on its clock is 0.3 s behind.
+    """
     begin = window.now()
     for number in range(len(samples) // FRAME):
         at = begin + number * FRAME / RATE
         await asyncio.sleep(at + FRAME / RATE + late - window.now())
         content = samples[number * FRAME : (number + 1) * FRAME].astype("<i2").tobytes()
+        behind = 0.0 if jumps is None or number < jumps else 0.3
         if number not in lost:
             window.publish(
-                keys.sound(person), SoundFrame(at=window.stamp(at), rate=RATE, samples=content, number=number + 1)
+                keys.sound(person),
+                SoundFrame(at=window.stamp(at - behind), rate=RATE, samples=content, number=number + 1),
             )
     if ends:
         window.publish(keys.sound(person), SoundFrame(at=window.stamp(), rate=RATE, number=len(samples) // FRAME + 1))
@@ -68,12 +87,24 @@ async def test_the_voice_is_that_of_the_person_at_the_page_with_its_instants_and
     assert not heard.of(ActorLost, actor="visitor")
 
 
-async def test_sound_of_a_page_that_comes_too_early_is_not_taken_for_the_robots_voice(hub: MemoryHub):
-    """The robot speaks with a voice that does not tell what it plays: nobody is heard then, and that is told."""
+async def test_pages_are_heard_from_the_instant_on_at_which_hearing_listens_and_know_it(hub: MemoryHub):
+    """What is said to one that restarts slowly is told to be lost: the window asks whether anybody hears it."""
+    window = hub.join("console", role="wizard")
+    own: dict[str, Service] = {"hearing": partial(hear, config=HearingConfig(source="page"))}
+    async with running(hub, own):
+        await asyncio.sleep(10.0)
+        assert "not ready yet" in unheard(window, keys.sound("ann"))
+        async with running(hub, {"recognition": idle}):
+            await asyncio.sleep(LOOK_AROUND + 0.1)
+            assert not unheard(window, keys.sound("ann"))
+
+
+async def test_the_robots_voice_is_known_that_began_before_hearing_listened(hub: MemoryHub):
+    """It does not tell what it plays: nobody is heard then, and that is told."""
 
     async def speaks(bus: Bus, ready: Ready) -> None:
         ready()
-        await asyncio.sleep(1.0)
+        await asyncio.sleep(0.2)
         bus.publish(keys.ROBOT_ACTION, ActionBegan(actor=bus.robot, action="speak", at=bus.stamp()))
         await asyncio.get_running_loop().create_future()
 
@@ -144,6 +175,17 @@ async def test_sound_that_is_lost_is_told_once_and_a_gap_ends_the_speech(hub: Me
         assert [fault.reason for fault in heard.of(Fault)] == ["sound from the microphone of ann is lost on its way"]
         await send(window, "ann", said.samples, lost=range(middle, middle + 10))
         assert len(heard.speeches) == 3
+
+
+async def test_a_clock_that_jumps_ends_the_speech_and_that_is_told(hub: MemoryHub):
+    said = spoken(LONG)
+    middle = round((said.since + said.until) / 2 * RATE / FRAME)
+
+    async with pages(hub) as (heard, window), perceive("ann", hub=hub):
+        await send(window, "ann", said.samples, jumps=middle)
+        assert len(heard.speeches) == 2
+        [fault] = heard.of(Fault)
+        assert fault.reason == "a speech of ann has ended where some of its sound is missing"
 
 
 async def test_a_flood_of_microphones_is_bounded_and_what_is_no_sound_of_ours_is_told(hub: MemoryHub):

@@ -47,6 +47,16 @@ def test_what_is_no_wav_file_of_16_bits_is_refused_with_what_to_do():
         read_wav(io.BytesIO(written(width=1)), "a.wav")
 
 
+def test_a_file_that_ends_before_its_end_is_refused_unless_nobody_knew_where_that_would_be():
+    whole = written()
+    with pytest.raises(InputRefused, match=r"it ends after .* s, and says that it has .* s of sound") as refused:
+        read_wav(io.BytesIO(whole[:-20]), "a.wav")
+    assert "ffmpeg" in refused.value.fault.advice
+    for length in (2**32 - 1, 2**31, 2**31 - 1):
+        piped = whole[:40] + length.to_bytes(4, "little") + whole[44:]
+        assert np.array_equal(read_wav(io.BytesIO(piped), "a.wav"), read_wav(io.BytesIO(whole), "a.wav"))
+
+
 @pytest.mark.parametrize("rate", [0, 1, 4_000_000_000])
 def test_a_file_with_a_rate_that_no_sound_has_is_refused(rate: int):
     whole = written()

@@ -81,8 +81,8 @@ def test_where_sound_is_missing_a_voice_has_ended_and_nothing_is_heard_across_th
     assert edges(told) == [VoiceBegan(0.0)]
 
     told = edges(ear.feed(np.zeros(3 * WINDOW, np.int16), 2.0))
-    assert told == [VoiceEnded(pytest.approx(5 * LENGTH - LATE)), VoiceBegan(2.0)]
-    assert edges(ear.lose()) == [VoiceEnded(pytest.approx(2.0 + 3 * LENGTH - LATE))]
+    assert told == [VoiceEnded(pytest.approx(5 * LENGTH - LATE), "gap"), VoiceBegan(2.0)]
+    assert edges(ear.lose()) == [VoiceEnded(pytest.approx(2.0 + 3 * LENGTH - LATE), "lost")]
     assert ear.lose() == []
 
 

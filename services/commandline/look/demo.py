@@ -179,8 +179,11 @@ async def _first(*waits: Coroutine[Any, Any, Any]) -> None:
 
 
 async def _left(shown: "WindowServer", last: Seconds | None) -> None:
-    """Wait until nobody has been there for a while. last: when somebody was; None: until somebody has been at all."""
-    while last is None or shown.bus.now() - last < EMPTY:
+    """Wait until nobody has been there for a while. last: when somebody was; None: until somebody has been at all.
+
+    Who is there is looked at first: a process that stood still for that while has not seen anybody leave.
+    """
+    while shown.picture.present or last is None or shown.bus.now() - last < EMPTY:
         if shown.picture.present:
             last = shown.bus.now()
         await asyncio.sleep(LOOK)

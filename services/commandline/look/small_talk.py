@@ -82,6 +82,7 @@ PHRASES = (
 async def talk(robot: Robot) -> None:
     """Talk with all who are there, until cancelled."""
     here: dict[str, asyncio.Task[None]] = {}
+    silences: dict[str, list[tuple[float, str]]] = {}
     floor = asyncio.Lock()
     async with asyncio.TaskGroup() as group:
         with robot.worlds() as worlds:
@@ -89,28 +90,33 @@ async def talk(robot: Robot) -> None:
                 for person in {each.id for each in world.people} ^ here.keys():
                     if person in here:
                         here.pop(person).cancel()
+                        silences.pop(person, None)
                     else:
-                        here[person] = group.create_task(talk_with(robot, person, floor))
+                        here[person] = group.create_task(talk_with(robot, person, floor, silences))
 
 
-async def talk_with(robot: Robot, person: str, floor: asyncio.Lock) -> None:
+async def talk_with(
+    robot: Robot, person: str, floor: asyncio.Lock, silences: dict[str, list[tuple[float, str]]]
+) -> None:
     """Greet a person, if they do not speak first, and answer them.
 
-    floor: of the robot, which says one thing at a time.
+    floor: of the robot, which says one thing at a time. silences: what is left of `SILENCE` for each who is here: all
+    hear what the robot says to one of them.
     """
-    silence, heard_id, speaks = list(SILENCE), "", False
+    silences[person], heard_id, speaks = list(SILENCE), "", False
     with robot.utterances() as utterances:
         while True:
-            seconds, line = silence[0] if silence else (None, "")
-            said = await utterances.next(WORDS if speaks else seconds)
-            if said is None and not speaks:
-                silence.pop(0)
+            next_one = silences[person][0] if silences[person] else (None, "")
+            said = await utterances.next(WORDS if speaks else next_one[0])
+            if said is None and not speaks and next_one in silences[person]:
+                for each in [person] if next_one == SILENCE[0] else silences:
+                    silences[each] = [one for one in silences[each] if one != next_one]
                 async with floor:
-                    await say(robot, person, line, 3)
+                    await say(robot, person, next_one[1], 3)
             speaks = said is not None and said.actor == person and not said.final
             if said is not None and said.actor == person and said.final and said.id != heard_id:
                 heard_id, text = said.id, answer(said.text, (await robot.world()).objects)
-                silence = [] if text.startswith("Goodbye") else list(SILENCE[1:])
+                silences[person] = [] if text.startswith("Goodbye") else list(SILENCE[1:])
                 async with floor:
                     await say(robot, person, text, 2)
 

@@ -127,6 +127,7 @@ export function bar({ top, bottom, order, turn, session, examples, spoken }) {
   const here = element("div", { class: "here" }, sayings, form, element("div", { class: "quickly" }, ...quick, nod, point, leave));
   bottom.append(hint, away, here);
 
+  const had = (isOf, { state, isLacking }) => (!isOf ? "none" : state === "on" ? "on" : isLacking ? "lacking" : "off"); // a device
   let last = null;
   const robot = voice(shows("voice"));
   const ear = microphone(session, {
@@ -202,8 +203,8 @@ export function bar({ top, bottom, order, turn, session, examples, spoken }) {
       if (hadFocus) (state.person ? words : sit).focus({ preventScroll: true });
       who.hidden = !state.person;
       who.children[1].textContent = text?.you ?? "";
-      put(who, state.measure, state.speaks);
-      who.lastChild.textContent = text?.mine[state.measure?.level ?? "unknown"] ?? "";
+      put(who, state.part, state.speaks);
+      who.lastChild.textContent = text?.mine[state.part.level] ?? "";
     },
     // Say one line; urgent: it stays before others for a while.
     hint(line) {
@@ -227,15 +228,13 @@ export function bar({ top, bottom, order, turn, session, examples, spoken }) {
     get isSpeaking() {
       return isSpeaking;
     },
-    // The microphone, for who wants to talk: none (the robot hears nobody), off, on, or lacking, until it is pressed again.
+    // The microphone, for who wants to talk: none (the robot hears nobody), wordless (it understands no words), off, on, or lacking, until it is pressed again.
     get ear() {
-      const { state, isLacking } = sounds.microphone;
-      return !last?.hears ? "none" : state === "on" ? "on" : isLacking ? "lacking" : "off";
+      return last?.hears === "voices" ? "wordless" : had(last?.hears, sounds.microphone);
     },
     // The camera, in the same words.
     get eye() {
-      const { state, isLacking } = sounds.camera;
-      return !last?.sees ? "none" : state === "on" ? "on" : isLacking ? "lacking" : "off";
+      return had(last?.sees, sounds.camera);
     },
     // What is wrong with microphone, camera or voice, in words; empty: nothing.
     get trouble() {

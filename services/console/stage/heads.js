@@ -1,5 +1,6 @@
 // What stands at the heads: bubbles with words as they are said, names, and how much each person takes part.
 import { element } from "../page/look.js";
+import { part } from "./visit.js";
 
 const STAYS = 5; // seconds that a bubble stays after its words
 const EACH = 0.28; // and for each word
@@ -107,10 +108,10 @@ export function heads(overlay, spoken) {
           names.set(person.id, { made, name, level });
         }
         const { made, name, level } = names.get(person.id);
-        const measure = talk.levels.find(({ actor }) => actor === person.id);
-        put(made, measure, person.speaks);
+        const takes = part(talk, scene, person.id);
+        put(made, takes, person.speaks);
         name.textContent = text.called(person.id);
-        level.textContent = person.speaks ? text.speaks : text.levels[measure?.level ?? "unknown"];
+        level.textContent = person.speaks ? text.speaks : text.levels[takes.level];
         const place = where([person.at[0], person.at[1], person.at[2] - 0.26]);
         const { offsetWidth: width, offsetHeight: height } = made;
         const tag = { left: Math.min(Math.max(place.x - width / 2, GAP), box.width - width - GAP), top: place.y, width, height };
@@ -133,8 +134,8 @@ function raised([x, y, z], by) {
 }
 
 // How much somebody takes part, as a ring that fills.
-export function put(made, measure, speaks) {
-  made.dataset.level = measure?.level ?? "unknown";
-  made.style.setProperty("--part", measure?.value ?? 0);
+export function put(made, { level, value }, speaks) {
+  made.dataset.level = level;
+  made.style.setProperty("--part", value ?? 0);
   made.classList.toggle("speaks", Boolean(speaks));
 }

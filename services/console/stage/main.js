@@ -1,18 +1,20 @@
 // The stage: what a visitor sees of the robot, and how they sit down and talk with it.
-import { follow } from "../page/link.js";
+import { ENDED, follow } from "../page/link.js";
 import { bar as bars } from "./bar.js";
 import { heads as atHeads } from "./heads.js";
 import { scene as space } from "./scene.js";
 import { touch as hands } from "./touch.js";
-import { moment, visit } from "./visit.js";
+import { moment, part, visit } from "./visit.js";
 import { another, language, texts } from "./words.js";
 
 const TOLD = 4; // seconds for which news of an order are shown
+const SEAT = `engage-seat ${location.pathname}`; // who one is, while the page is loaded anew
 const at = (what) => document.querySelector(what);
 const asked = new URLSearchParams(location.search);
 const isKiosk = asked.has("kiosk");
 const { language: robotSpeaks, examples } = document.body.dataset;
-const state = { robot: document.body.dataset.robot, person: "", scene: null, talk: null, text: null, denied: "", link: "" };
+const state = { robot: document.body.dataset.robot, person: sessionStorage.getItem(SEAT) ?? "", scene: null, talk: null, text: null, denied: "", link: "" };
+sessionStorage.removeItem(SEAT);
 const clock = () => performance.now() / 1000;
 
 let spoken = asked.get("lang") ?? (isKiosk ? null : localStorage.getItem("engage-language"));
@@ -81,7 +83,7 @@ function tell() {
   const present = scene?.people.filter((each) => each.at && each.present && each.id !== person) ?? [];
   bar.take({
     person, denied: state.denied, ready: talk?.state === "ready" && !state.link && Boolean(scene?.body), company: present.map(({ id }) => id),
-    measure: talk?.levels.find(({ actor }) => actor === person), speaks: isTalking(), hears: talk?.hears, sees: talk?.sees,
+    part: part(talk, scene, person), speaks: isTalking(), hears: talk?.hears, sees: talk?.sees,
   });
   document.body.classList.toggle("seated", Boolean(person));
   if (shown && scene) shown.take(scene, person);
@@ -105,7 +107,6 @@ function readOut(isBefore) {
 
 let offset = null; // from our clock to seconds of the picture
 const link = follow({
-  place: "stage/frames",
   take(frame, isFirst) {
     const behind = clock() - frame.now;
     offset = offset === null || isFirst || behind < offset ? behind : offset + (behind - offset) * 0.002; // frames come late, never early
@@ -113,9 +114,10 @@ const link = follow({
     if (frame.sections?.scene) state.scene = frame.sections.scene;
     if (frame.sections?.talk) state.talk = frame.sections.talk;
     if (frame.you) {
-      if (state.person && !frame.you.person && isFirst) note(state.text.gone);
+      if (state.person && !frame.you.person && isFirst) note(state.text.gone, Infinity);
       if (state.person !== (frame.you.person ?? "")) at(".read").replaceChildren();
       state.person = frame.you.person ?? "";
+      if (state.person && news.until === Infinity) note("", 0); // they sit again
       state.denied = frame.you.denied?.seat ?? "";
     }
     if (frame.told?.length) refuse(frame.told);
@@ -124,7 +126,7 @@ const link = follow({
     document.body.dataset.frames = Number(document.body.dataset.frames ?? 0) + 1;
   },
   tell(isThere, reason = "") {
-    const now = isThere ? "" : reason ? "full" : "lost";
+    const now = isThere ? "" : reason === ENDED ? "ended" : reason ? "full" : "lost";
     if (state.link === now) return;
     state.link = now;
     tell();
@@ -133,9 +135,10 @@ const link = follow({
   wait() {},
 });
 
-function note(text) {
-  news = { text, until: clock() + TOLD };
+function note(text, until = clock() + TOLD) {
+  news = { text, until };
 }
+addEventListener("pagehide", () => state.person && sessionStorage.setItem(SEAT, state.person));
 function refuse(told) {
   bar.rise();
   note(told.some(({ text }) => text.includes("on its way")) ? state.text.busy : state.text.refused);
@@ -180,7 +183,7 @@ function hint(now) {
   const next = visit(now - idle, { seated: true, kiosk: isKiosk, touched });
   const tips = text.tips(bar.ear, bar.eye);
   if (next.do === "tip" && [undefined, "mutual", "meet"].includes(met?.text)) return tips[next.number % tips.length];
-  if (met?.text === "looking" && ["off", "lacking"].includes(bar.ear)) return tips[0];
+  if (met?.text === "looking" && ["off", "lacking", "wordless"].includes(bar.ear)) return tips[0];
   if (met) return typeof text[met.text] === "function" ? text[met.text](named(met.about)) : text[met.text];
   return tips[0];
 }
@@ -198,6 +201,7 @@ function tick() {
   if (next.do === "anew") {
     touched = false;
     link.end();
+    state.person = ""; // it is the next visitor's page
     location.replace(`${location.pathname}?kiosk`);
     return;
   }

@@ -13,6 +13,15 @@ export function visit(idle, { seated, kiosk, touched }) {
   return { do: "nothing" };
 }
 
+// How somebody takes part: the name of a text, and how much, 0 to 1. The level is of what goes on with the robot itself; who looks at what lies before both
+// of them is at their task, whatever the level falls to, and not elsewhere.
+export function part(talk, scene, id) {
+  const { level = "unknown", value = 0 } = talk?.levels.find(({ actor }) => actor === id) ?? {};
+  const looks = scene?.people.find((each) => each.id === id)?.looks ?? [];
+  const isAtTask = looks.some((one) => scene.things.some((each) => each.id === one && each.kind !== "hand"));
+  return { level: isAtTask && ["disengaging", "disengaged"].includes(level) ? "occupied" : level, value };
+}
+
 // What goes on between the robot and a person, in the order of what they should know first: the name of a text, and a thing that it is about.
 export function moment(talk, robot, you) {
   const bonds = talk.bonds.filter(({ by, to }) => (by === robot && to === you) || (by === you && to === robot));

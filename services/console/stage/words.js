@@ -21,7 +21,7 @@ const ENGLISH = {
   loud: "The robot's voice",
   talks: "You are talking…",
   type: "Say something",
-  typing: (language) => `Say something in ${language}`,
+  within: (language) => ` in ${language}`,
   speaking: (language) => `It speaks ${language}.`,
   send: "Say it",
   sayings: "What you can say",
@@ -32,8 +32,8 @@ const ENGLISH = {
   scene: "The robot and the people before it, in 3D.",
   pieces: "Things on the table: Enter looks at one, P points at it, the arrows move it.",
   log: "What was said just now",
-  levels: { engaged: "is with us", engaging: "is joining", disengaging: "is drifting away", disengaged: "is elsewhere", unknown: "" },
-  mine: { engaged: "are with us", engaging: "are joining", disengaging: "are drifting away", disengaged: "are elsewhere", unknown: "" },
+  levels: { engaged: "is with us", engaging: "is joining", occupied: "is at the table", disengaging: "is drifting away", disengaged: "is elsewhere", unknown: "" },
+  mine: { engaged: "are with us", engaging: "are joining", occupied: "are at the table", disengaging: "are drifting away", disengaged: "are elsewhere", unknown: "" },
   speaks: "speaks",
   looking: "The robot waits for your answer.",
   about: (thing) => `The robot looks at the ${thing}. Look at it, too: touch it.`,
@@ -41,8 +41,12 @@ const ENGLISH = {
   meet: "The robot looks at you. Touch its face to look back.",
   listen: "The robot is speaking to you.",
   elsewhere: (name) => `The robot is speaking to ${name}.`,
-  tips: (ear, eye) => [
-    ...({ on: ["Just talk: the robot hears you."], off: ["Press the microphone, and talk."], lacking: ["Type what you want to say."] }[ear] ?? []),
+  // other: words for the language of the robot, where it is not that of the page.
+  tips: (ear, eye, other) => [
+    ...({
+      on: [other ? `Talk${other}: the robot understands nothing else.` : "Just talk: the robot hears you."], off: [`Press the microphone, and talk${other}.`],
+      lacking: [`Type what you want to say${other}.`], wordless: [`Type your words${other}: by the microphone the robot only notices that you talk.`],
+    }[ear] ?? []),
     ...({ on: ["The robot sees where you look. For a piece, touch it."], off: ["Press the camera, and the robot sees where you look."] }[eye] ?? []),
     "Touch a piece to look at it.", "Drag a piece to move it.", ...(ear === "none" ? ["Hold the round button, and talk."] : []), "Choose Point, and touch a piece.",
   ],
@@ -51,6 +55,7 @@ const ENGLISH = {
   away: "The robot is getting ready…",
   held: "The robot pauses for a moment.",
   lost: "No link to the robot. Trying again…",
+  ended: "The robot was switched off. Ask who looks after it.",
   onlooker: "You look on. To sit down, open the address that the robot's host shows.",
   full: "So many look on that there is no room. Trying again…",
   refused: "That did not work just now. Try again.",
@@ -60,7 +65,7 @@ const ENGLISH = {
   ending: (seconds) => `In ${seconds} s it begins anew for the next visitor.`,
   stay: "I am here",
   flat: "This browser shows no 3D. Words and buttons work all the same.",
-  sound: { late: "", plain: "this page came by http, and browsers want https for it. Ask who looks after the robot" },
+  sound: { late: "", unheard: () => "The robot does not hear you just now.", plain: "this page came by http, and browsers want https for it. Ask who looks after the robot" },
   seen: { models: "what finds faces is not installed here. Ask who looks after the robot" },
 };
 const GERMAN = {
@@ -82,7 +87,7 @@ const GERMAN = {
   loud: "Die Stimme des Roboters",
   talks: "Du sprichst…",
   type: "Sag etwas",
-  typing: (language) => `Sag etwas auf ${language}`,
+  within: (language) => ` auf ${language}`,
   speaking: (language) => `Er spricht ${language}.`,
   send: "Sagen",
   sayings: "Was du sagen kannst",
@@ -93,8 +98,8 @@ const GERMAN = {
   scene: "Der Roboter und die Menschen vor ihm, in 3D.",
   pieces: "Dinge auf dem Tisch: Enter schaut hin, P zeigt darauf, die Pfeile bewegen es.",
   log: "Was eben gesagt wurde",
-  levels: { engaged: "ist dabei", engaging: "kommt dazu", disengaging: "schweift ab", disengaged: "ist woanders", unknown: "" },
-  mine: { engaged: "bist dabei", engaging: "kommst dazu", disengaging: "schweifst ab", disengaged: "bist woanders", unknown: "" },
+  levels: { engaged: "ist dabei", engaging: "kommt dazu", occupied: "ist am Tisch", disengaging: "schweift ab", disengaged: "ist woanders", unknown: "" },
+  mine: { engaged: "bist dabei", engaging: "kommst dazu", occupied: "bist am Tisch", disengaging: "schweifst ab", disengaged: "bist woanders", unknown: "" },
   speaks: "spricht",
   looking: "Der Roboter wartet auf deine Antwort.",
   about: () => "Der Roboter schaut ein Teil an. Schau auch hin: berühre es.",
@@ -102,8 +107,11 @@ const GERMAN = {
   meet: "Der Roboter schaut dich an. Berühre sein Gesicht, um zurückzuschauen.",
   listen: "Der Roboter spricht mit dir.",
   elsewhere: (name) => `Der Roboter spricht mit ${name}.`,
-  tips: (ear, eye) => [
-    ...({ on: ["Sprich einfach: der Roboter hört dich."], off: ["Drück auf das Mikrofon, und sprich."], lacking: ["Schreib, was du sagen willst."] }[ear] ?? []),
+  tips: (ear, eye, other) => [
+    ...({
+      on: [other ? `Sprich${other}: der Roboter versteht nichts anderes.` : "Sprich einfach: der Roboter hört dich."], off: [`Drück auf das Mikrofon, und sprich${other}.`],
+      lacking: [`Schreib${other}, was du sagen willst.`], wordless: [`Schreib deine Worte${other}: am Mikrofon merkt der Roboter nur, dass du sprichst.`],
+    }[ear] ?? []),
     ...({ on: ["Der Roboter sieht, wohin du schaust. Ein Teil berührst du."], off: ["Drück auf die Kamera, und der Roboter sieht, wohin du schaust."] }[eye] ?? []),
     "Berühre ein Teil, um es anzusehen.", "Zieh ein Teil, um es zu bewegen.", ...(ear === "none" ? ["Halte den runden Knopf, und sprich."] : []), "Wähle Zeigen, und berühre ein Teil.",
   ],
@@ -112,6 +120,7 @@ const GERMAN = {
   away: "Der Roboter macht sich bereit…",
   held: "Der Roboter hält einen Moment inne.",
   lost: "Keine Verbindung zum Roboter. Neuer Versuch…",
+  ended: "Der Roboter wurde ausgeschaltet. Frag, wer sich um ihn kümmert.",
   onlooker: "Du schaust zu. Zum Hinsetzen öffne die Adresse, die der Gastgeber zeigt.",
   full: "So viele schauen zu, dass kein Platz mehr ist. Neuer Versuch…",
   refused: "Das ging gerade nicht. Versuch es noch einmal.",
@@ -121,7 +130,7 @@ const GERMAN = {
   ending: (seconds) => `In ${seconds} s beginnt es neu für den nächsten Besuch.`,
   stay: "Ich bin da",
   flat: "Dieser Browser zeigt kein 3D. Worte und Knöpfe gehen trotzdem.",
-  sound: { late: "", plain: "diese Seite kam über http, und Browser wollen dafür https. Frag, wer sich um den Roboter kümmert" },
+  sound: { late: "", unheard: () => "Der Roboter hört dich gerade nicht.", plain: "diese Seite kam über http, und Browser wollen dafür https. Frag, wer sich um den Roboter kümmert" },
   seen: { models: "was Gesichter findet, ist hier nicht installiert. Frag, wer sich um den Roboter kümmert" },
 };
 const ALL = { en: ENGLISH, de: GERMAN };
@@ -137,6 +146,7 @@ export function texts(name, spoken) {
   const own = ALL[name];
   const called = new Intl.DisplayNames([name], { type: "language" }).of(spoken.split("-")[0]);
   const isOther = spoken.split("-")[0].toLowerCase() !== name;
+  const other = isOther ? own.within(called) : "";
   return {
     ...own,
     // How a person is called: by their name, or as somebody who has none.
@@ -144,7 +154,8 @@ export function texts(name, spoken) {
     // The names of several; empty: not all of them have one.
     listed: (ids) => (ids.some((id) => NAMELESS.test(id)) ? "" : new Intl.ListFormat(name).format(ids)),
     welcome: isOther ? `${own.welcome} ${own.speaking(called)}` : own.welcome,
-    type: isOther ? own.typing(called) : own.type,
+    type: `${own.type}${other}`,
+    tips: (ear, eye) => own.tips(ear, eye, other),
     quick: own.quick.map(([label, , how], index) => [label, ALL[language([spoken])].quick[index][1], how]),
     sound: { ...SOUND_WORDS[name], ...own.sound },
     seen: { ...CAMERA_WORDS[name], plain: own.sound.plain, ...own.seen },

@@ -1,7 +1,8 @@
 """Health of each participant of the bus: whether it is there, what it says of itself, what is wrong. Pure."""
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.participants import PeerAlive, PeerGone, Status, is_claim
+from engage_hri.schemas.faults import InputRefused
+from engage_hri.schemas.participants import PeerAlive, PeerGone, ServiceSettings, Status, is_claim, sections
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.console.web.sections import Health
 
@@ -61,6 +62,14 @@ class HealthBoard:
             serves=here and (status is None or status.stands is not None),
             warnings=tuple(warnings), facts=tuple(_facts(status)) if status is not None and here else (),
         )  # fmt: skip
+
+
+def recognizes(told: ServiceSettings) -> bool:
+    """Tell whether these settings of hearing name who understands words. What nobody can read names nobody."""
+    try:
+        return bool(sections(told.settings)["hearing"]["recognizer"])
+    except (InputRefused, LookupError, TypeError):
+        return False
 
 
 def _place(name: str) -> int:

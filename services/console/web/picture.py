@@ -27,7 +27,7 @@ from engage_hri.schemas.body_faults import BodyFaults, words
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import FragmentOutcome, HeadOwner, StudyCondition
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.participants import PeerAlive, PeerGone, Status, is_claim
+from engage_hri.schemas.participants import PeerAlive, PeerGone, ServiceSettings, Status, is_claim
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, SamePeople, Statistics
 from engage_hri.schemas.units import Seconds
@@ -35,7 +35,7 @@ from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import Acquaintances
 from engage_hri.services.console import nets, view, wording
 from engage_hri.services.console.web import scene
-from engage_hri.services.console.web.health import HealthBoard
+from engage_hri.services.console.web.health import HealthBoard, recognizes
 from engage_hri.services.console.web.lanes import BlockLanes, EventLanes, FloorLanes, Measures
 from engage_hri.services.console.web.scene import plainly
 from engage_hri.services.console.web.sections import Choice, HeadSection, Note, Switched, UtteranceShown
@@ -75,6 +75,7 @@ class Picture:
         self._numbers = count()
         self._choices: deque[Choice] = deque(maxlen=CHOICES_KEPT)
         self._health = HealthBoard()
+        self._understands = False
         self._notes: deque[Note] = deque(maxlen=NOTES_KEPT)
         self._sections: dict[str, Callable[[], Any]] = {
             "scene": lambda: scene.section(self._scene, self._world, self._state, self._body),
@@ -126,6 +127,11 @@ class Picture:
         ]
         looks = ["where it looks"] if any(id.startswith(view.OWN_BLOCKS) for id in known) else []
         return ", ".join(dict.fromkeys((*told, *looks)))
+
+    @property
+    def understands(self) -> bool:
+        """True if who hears people understands words, as its settings say."""
+        return self._understands
 
     def has(self, name: str) -> bool:
         """Tell whether a participant is on the bus."""
@@ -182,6 +188,9 @@ class Picture:
                 self._changed("health")
                 if not isinstance(message, Status):
                     self._take_presence(message, at)
+            case ServiceSettings(participant="hearing"):
+                self._understands = recognizes(message)
+                self._changed("health")
             case Held() | BodyFaults() | StudyCondition():
                 self._changed("switched")
         if not is_again:

@@ -25,7 +25,7 @@ from engage_hri.services.console.web.seats import Invitation, Seats, invitation
 
 PATTERNS = (
     *FOLLOWED, keys.ANY_ALIVE, keys.WORLD, keys.ROBOT_STATE, keys.ROBOT_MOTION, keys.NET, keys.ROBOT_ONGOING,
-    keys.ANY_PERCEIVED_ONGOING,
+    keys.ANY_PERCEIVED_ONGOING, keys.settings("hearing"),
 )  # fmt: skip
 """Expressions for all that the window shows."""
 ASKED_EVERY: Seconds = 3.0

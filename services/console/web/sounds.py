@@ -41,7 +41,7 @@ def unheard(bus: Bus, key: str) -> str:
     advice = "start `engage run hearing --from page`"
     if not has_hearing():
         advice = f"install it, {extra_command('hearing')}, and {advice}"
-    return f"hearing does not run: {advice}"
+    return f"hearing does not run, or is not ready yet: {advice}"
 
 
 class Sounds(PageLinks):

@@ -22,6 +22,8 @@ EYES = "eyes"
 """Service that sees people."""
 BUBBLES = 6
 """Turns that are told at most, the newest."""
+Hears = Literal["", "voices", "words"]
+"""What is heard of people: nothing, that they speak, or what they say."""
 Readiness = Literal["ready", "held", "away"]
 """State of the robot: it acts, somebody has stopped it for a while, or a service of it is not there."""
 
@@ -63,7 +65,7 @@ class LevelShown(Struct, frozen=True):
 class StageTalk(Struct, frozen=True):
     """All of the stage but what has a place in space. played: people that a program plays.
 
-    task: the robot does its task with whoever comes first. hears, sees: it hears people, and sees them.
+    task: the robot does its task with whoever comes first. sees: it sees people.
     """
 
     state: Readiness
@@ -73,7 +75,7 @@ class StageTalk(Struct, frozen=True):
     levels: tuple[LevelShown, ...]
     played: tuple[str, ...]
     task: bool
-    hears: bool
+    hears: Hears
     sees: bool
 
 
@@ -85,8 +87,12 @@ def talk(
     health: Iterable[sections.Health],
     held: bool,
     reporters: Mapping[str, str],
+    understands: bool,
 ) -> StageTalk:
-    """Make the talk of sections of the picture. held: the robot is. reporters: the participant that tells of each."""
+    """Make the talk of sections of the picture.
+
+    held: the robot is. reporters: the participant that tells of each. understands: who hears people knows words.
+    """
     here = {each.name: each.here for each in health}
     services = [each.here for each in health if each.service]
     bubbles = [Bubble(each.actor, each.since, each.words, each.open) for each in words if each.words]
@@ -106,7 +112,7 @@ def talk(
         ),
         played=tuple(person for person, reporter in reporters.items() if reporter == SIMULATION),
         task=here.get(TASK, False),
-        hears=here.get(HEARING, False),
+        hears="" if not here.get(HEARING) else "words" if understands else "voices",
         sees=here.get(EYES, False),
     )  # fmt: skip
 
@@ -147,8 +153,9 @@ class StageFace:
         people = [made(name) for name in self._picture.versions if name.startswith(MEASURES)]
         held = bool(made("switched").held)
         return talk(
-            made("words"), made("floor"), made("events"), people, made("health"), held, self._picture.reporters
-        )
+            made("words"), made("floor"), made("events"), people, made("health"), held, self._picture.reporters,
+            self._picture.understands,
+        )  # fmt: skip
 
 
 def _is_talk(name: str) -> bool:

@@ -48,7 +48,7 @@ class DeviceEars:
             if self._is_lost:
                 self._is_lost = False
                 journal.alert(self._bus.log, "hearing again")
-            await intake.catch_up()
+            intake.catch_up()
             for number, channel in enumerate(self._channels):
                 self._speeches.feed(channel, np.ascontiguousarray(piece.samples[:, number]), piece.at)
         self.close()

@@ -1,12 +1,13 @@
-"""Messages that hearing takes besides sound: who is here, and the robot's own voice."""
+"""Messages that hearing takes besides sound: who is here, and the robot's own voice.
+
+The sound of pages is subscribed to when it is listened to, and no sooner: until then a page is told that nobody hears
+it, and what is said to it is not lost unseen."""
 
 from collections.abc import Iterable
 
-from engage_hri.schemas import keys
 from engage_hri.schemas.participants import PeerAlive
-from engage_hri.schemas.sound import SoundFrame
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus.interface import Bus, Received, Subscription
+from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.perception.hearing.company import HeardPeople
 from engage_hri.services.perception.hearing.speeches import Speeches
 
@@ -15,25 +16,29 @@ LOOK_AROUND: Seconds = 0.5
 
 
 class HearingIntake:
-    """Takes what comes to an inbox, for people and speeches."""
+    """Takes what comes, for people and speeches. patterns: of its keys. inbox: what has come."""
 
-    def __init__(self, bus: Bus, inbox: Subscription, people: HeardPeople, speeches: Speeches) -> None:
-        self._bus, self.inbox, self._people, self._speeches = bus, inbox, people, speeches
+    def __init__(self, bus: Bus, patterns: Iterable[str], people: HeardPeople, speeches: Speeches) -> None:
+        self._bus, self._people, self._speeches = bus, people, speeches
+        self.inbox = bus.subscribe(*patterns)
 
     def take(self, received: Received) -> None:
-        """Take one message. Sound of a page is nothing here: it comes before anybody listens to pages."""
-        if isinstance(received.message, SoundFrame) and received.key != keys.ROBOT_SOUND:
-            return
+        """Take one message."""
         with self._bus.containing(received):
             self._people.take(received)
             self._speeches.take(received.message)
 
-    async def catch_up(self) -> None:
+    def widen(self, pattern: str) -> None:
+        """Let what this pattern includes come as well, from now on."""
+        before, self.inbox = self.inbox, self._bus.subscribe(*self.inbox.patterns, pattern)
+        before.close()
+        while (received := before.take()) is not None:
+            self.take(received)
+
+    def catch_up(self) -> None:
         """Take all that has come."""
-        while len(self.inbox):
-            received = await self.inbox.next()
-            if received is not None:
-                self.take(received)
+        while (received := self.inbox.take()) is not None:
+            self.take(received)
 
     async def wait_until(self, deadline: Seconds) -> None:
         """Take what comes until this loop time."""

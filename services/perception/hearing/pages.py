@@ -17,15 +17,13 @@ MOST_PAGES = 16
 """Microphones of pages that are heard at once: a detector needs 10 MB, and 0.7 % of a processor."""
 OLD: Seconds = 10.0
 """Age from which on sound of a page is of no use."""
-WHOLE: Seconds = 5.0
-"""Time without loss after which a loss is told again."""
 
 
 class _PageMicrophone:
-    """The microphone of a page. number: of the last frame. came: loop time of its arrival. lossy: that of a loss."""
+    """The microphone of a page. number: of the last frame. came: loop time of its arrival."""
 
     def __init__(self, channel: SoundChannel, number: int) -> None:
-        self.channel, self.number, self.came, self.lossy = channel, number, 0.0, float("-inf")
+        self.channel, self.number, self.came = channel, number, 0.0
 
 
 class PageEars:
@@ -37,6 +35,7 @@ class PageEars:
 
     async def listen(self, intake: HearingIntake) -> None:
         """Hear them for ever. One that gives nothing any more is told, and ends."""
+        intake.widen(keys.ANY_SOUND)
         while True:
             until = min((page.came for page in self._pages.values()), default=float("inf")) + SILENT
             received = await intake.inbox.next(until)
@@ -75,11 +74,9 @@ class PageEars:
         if now - at > OLD or (page is None and (page := self._begin(person, frame.number)) is None):
             return
         if frame.number > page.number + 1:
-            if now - page.lossy > WHOLE:
-                reason = f"sound from the microphone of {person} is lost on its way"
-                advice = "the link of the page is slow"
-                self._faults.tell(Fault(reason=reason, where=keys.sound(person), advice=advice))
-            page.lossy = now
+            reason = f"sound from the microphone of {person} is lost on its way"
+            advice = "the link of the page is slow"
+            self._speeches.tell_loss(page.channel, Fault(reason=reason, where=keys.sound(person), advice=advice))
         page.number, page.came = frame.number, now
         self._speeches.feed(page.channel, np.frombuffer(frame.samples, "<i2"), at)
 

@@ -20,20 +20,21 @@ async def hear(bus: Bus, ready: Ready, config: HearingConfig) -> None:
     Raises InputRefused: there is no such sound or recognizer, or a package is not installed.
     """
     has_pages = config.source == PAGE
-    more = (keys.ANY_SOUND,) if has_pages else () if config.people else (keys.ANY_HEAD_POSE,)
+    more = () if has_pages or config.people else (keys.ANY_HEAD_POSE,)
     own = (keys.ROBOT_SOUND,) if is_cancelling(config) else ()
-    with bus.subscribe(keys.ANY_ROBOT_ALIVE, keys.WORLD, keys.ROBOT_ACTION, *more, *own) as inbox:
-        tell_settings(bus, "hearing", config)
-        people, faults = HeardPeople(bus), HearingFaults(bus)
-        speeches = Speeches(bus, config, people, faults)
-        intake = HearingIntake(bus, inbox, people, speeches)
-        ears = PageEars(bus, speeches, people, faults) if has_pages else DeviceEars(bus, config, speeches, faults)
-        try:
-            await speeches.made()
-            ready()
-            await intake.wait_for_recognition(config.people)
-            await ears.listen(intake)
-        finally:
-            ears.close()
-            speeches.close()
-            people.let_go()
+    patterns = keys.ANY_ROBOT_ALIVE, keys.WORLD, keys.ROBOT_ACTION, *more, *own
+    tell_settings(bus, "hearing", config)
+    people, faults = HeardPeople(bus), HearingFaults(bus)
+    speeches = Speeches(bus, config, people, faults)
+    ears = PageEars(bus, speeches, people, faults) if has_pages else DeviceEars(bus, config, speeches, faults)
+    intake = HearingIntake(bus, patterns, people, speeches)
+    try:
+        await speeches.made()
+        ready()
+        await intake.wait_for_recognition(config.people)
+        await ears.listen(intake)
+    finally:
+        intake.inbox.close()
+        ears.close()
+        speeches.close()
+        people.let_go()

@@ -14,6 +14,8 @@ from engage_hri.services.perception.hearing.voice import RATE, Samples
 ADVICE = "make it one: ffmpeg -i FILE -ar 16000 -c:a pcm_s16le FILE.wav"
 RATES = range(4000, 192_001)
 """Samples per second that a file may have, as those of a `SoundFrame`: what says another number is damaged."""
+UNKNOWN = 2**31 - 2**16
+"""Bytes from which on what a file says of its length means that whoever wrote it, into a pipe, did not know."""
 TAPS = 16
 """Zero crossings of the filter on each side of a sample, where the rate is changed."""
 AT_ONCE = 1 << 15
@@ -30,12 +32,17 @@ class Piece(Struct, frozen=True):
 def read_wav(file: BinaryIO, name: str) -> Samples:
     """Read a WAV file, at `RATE`: a row for each instant, a column for each channel.
 
-    file: open. name: for people. Raises InputRefused: it is no WAV file with samples of 16 bits, or of such a rate.
+    file: open. name: for people. Raises InputRefused: it is no whole WAV file of 16 bits and such a rate.
     """
     try:
         with wave.open(file) as read:
-            channels, width, rate = read.getnchannels(), read.getsampwidth(), read.getframerate()
-            content = read.readframes(read.getnframes())
+            channels, width, rate, count = (
+                read.getnchannels(),
+                read.getsampwidth(),
+                read.getframerate(),
+                read.getnframes(),
+            )
+            content = read.readframes(count)
     except (wave.Error, EOFError) as error:
         reason = f"it is no WAV file that can be read: {str(error) or 'it ends too early'}"
         raise InputRefused(Fault(reason=reason, where=name, advice=ADVICE)) from error
@@ -43,6 +50,10 @@ def read_wav(file: BinaryIO, name: str) -> Samples:
         raise InputRefused(Fault(reason=f"its samples have {8 * width} bits, not 16", where=name, advice=ADVICE))
     if rate not in RATES:
         reason = f"it says that it has {rate} samples per second: expected {RATES[0]} to {RATES[-1]}"
+        raise InputRefused(Fault(reason=reason, where=name, advice=ADVICE))
+    said, there = count / rate, len(content) / (2 * channels * rate)
+    if len(content) < 2 * channels * count < UNKNOWN:
+        reason = f"it ends after {there:.1f} s, and says that it has {said:.1f} s of sound"
         raise InputRefused(Fault(reason=reason, where=name, advice=ADVICE))
     whole = len(content) - len(content) % (2 * channels)
     samples = np.frombuffer(content[:whole], "<i2").reshape(-1, channels)

@@ -51,6 +51,8 @@ from engage_hri.services.perception.hearing.recognizing import (
 )
 from engage_hri.services.perception.hearing.turn_detectors import TurnDetectorSettings, TurnSound
 from engage_hri.services.perception.hearing.voice import (
+    LONGEST,
+    End,
     Samples,
     VoiceBegan,
     VoiceEar,
@@ -72,6 +74,8 @@ BEFORE_SPEECH: Seconds = 1.0
 """Time before the robot speaks from which on sound of its voice is that of this speech."""
 ECHO: Seconds = 0.2
 """Time for which the robot's voice goes on in the room, and in the devices, when it has ended."""
+WHOLE: Seconds = 5.0
+"""Time without loss after which a loss is told again."""
 LAST_WORDS: Seconds = 25.0
 """Time that the words of a file may take when it is over."""
 
@@ -98,7 +102,7 @@ class SoundChannel:
     """A channel of sound. Made by `Speeches`. person: whose voice is in it; empty: that of the only person here.
 
     speech: what is being said; None also of a voice that is nobody's. canceller, judge: None: the robot's own voice
-    stays in it.
+    stays in it. lossy: loop time at which some of its sound was lost last.
     """
 
     def __init__(self, person: str, pause: Seconds, own: OwnVoice | None) -> None:
@@ -108,6 +112,7 @@ class SoundChannel:
         self.ear = VoiceEar(self.judge or silero(), pause)
         self.speech: _Speech | None = None
         self.turn = TurnSound()
+        self.lossy: Seconds = float("-inf")
 
 
 class Speeches:
@@ -214,9 +219,10 @@ class Speeches:
                     if self.recognizer is not None:
                         self.recognizer.hear(channel.speech.number, _bytes(samples))
                     channel.turn.hear(samples)
-                case VoiceEnded(at=at) if (speech := channel.speech) is not None:
+                case VoiceEnded(at=at, why=why) if (speech := channel.speech) is not None:
                     channel.speech = None
                     self._ended(speech, at)
+                    self._tell_cut(channel, speech.utterance.actor, why)
                     if self.detector is not None:
                         self._judged[speech.number] = speech
                         self.detector.hear(speech.number, _bytes(channel.turn.end(at)))
@@ -248,6 +254,24 @@ class Speeches:
         self._people.perceived.tell(ActionEnded(actor=speech.utterance.actor, action="speak", at=stamp))
         if self.recognizer is not None:
             self.recognizer.hear(speech.number, b"")
+
+    def _tell_cut(self, channel: SoundChannel, person: str, why: End) -> None:
+        """Tell that a speech has ended otherwise than with a pause, unless somebody else tells why no more comes."""
+        if why == "gap":
+            reason = f"a speech of {person} has ended where some of its sound is missing"
+            advice = "sound is lost on its way, or the clock that tells its instants has jumped"
+            self.tell_loss(channel, Fault(reason=reason, where="hearing", advice=advice))
+        elif why == "long":
+            reason = f"a voice of {person} goes on for {LONGEST:g} s without a pause: it is told as several speeches"
+            advice = "is it noise, or music? a shorter hearing.pause finds more pauses"
+            self._faults.tell_once(Fault(reason=reason, where="hearing", advice=advice))
+
+    def tell_loss(self, channel: SoundChannel, fault: Fault) -> None:
+        """Tell that sound of a channel is lost, unless some was lost, and that told, a moment ago."""
+        now = self._bus.now()
+        if now - channel.lossy > WHOLE:
+            self._faults.tell(fault)
+        channel.lossy = now
 
     def _speaker(self, channel: SoundChannel) -> str | None:
         """The person whose voice this is; `STRANGER`: lips will show it. None: it cannot be told of several."""
@@ -300,6 +324,9 @@ class Speeches:
             words, is_final = answer.words, answer.final
         else:
             self._faults.tell(answer.fault)
+        if is_final and len(words.text) > LONGEST_TEXT:
+            reason = f"a speech of {len(words.text)} letters: those after the first {LONGEST_TEXT} are left out"
+            self._faults.tell(Fault(reason=reason, where="hearing.recognizer"))
         now, before = self._bus.stamp(), speech.utterance
         ended = (before.ended or now) if is_final else before.ended
         speech.utterance = replace(

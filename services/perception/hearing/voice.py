@@ -9,7 +9,7 @@ last quite sure, less the time by which it is late even then. docs/hearing.md ha
 from collections import deque
 from collections.abc import Callable
 from math import ceil
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from msgspec import Struct
@@ -58,10 +58,16 @@ class VoiceSound(Struct, frozen=True):
     samples: Samples
 
 
+End = Literal["pause", "gap", "long", "lost"]
+"""Why a voice has ended: with a pause; where sound is missing; too long for one speech, so it goes on as another; or
+as no more sound comes."""
+
+
 class VoiceEnded(Struct, frozen=True):
     """The voice has ended. at: loop time at which it was last to be heard."""
 
     at: Seconds
+    why: End = "pause"
 
 
 VoiceEvent = VoiceBegan | VoiceSound | VoiceEnded
@@ -91,7 +97,7 @@ class VoiceEar:
         """Take the next piece of sound. at: loop time at which its first sample was captured."""
         told: list[VoiceEvent] = []
         if self._rest_at is not None and abs(at - self._rest_at - len(self._rest) / RATE) > JUMP:
-            told += self.lose()
+            told += self.lose("gap")
         self._rest = np.concatenate([self._rest, samples])
         begin = at + (len(samples) - len(self._rest)) / RATE  # by the newest piece: clocks drift
         while len(self._rest) >= WINDOW:
@@ -101,11 +107,11 @@ class VoiceEar:
         self._rest_at = begin
         return told
 
-    def lose(self) -> list[VoiceEvent]:
+    def lose(self, why: End = "lost") -> list[VoiceEvent]:
         """Take note that no more sound comes for now. A voice that goes on has ended with what was heard of it."""
         self._rest, self._rest_at = self._rest[:0], None
         self._before.clear()
-        return self._ended(self._clear)
+        return self._ended(self._clear, why)
 
     def _judged(self, window: Samples, at: Seconds) -> list[VoiceEvent]:
         likely = self._judge((window / 32768).astype(np.float32))
@@ -122,9 +128,9 @@ class VoiceEar:
         if likely >= CLEAR:
             self._clear = at + LENGTH - LATE
         if self._count >= self._pause:
-            told += self._ended(self._clear)
+            told += self._ended(self._clear, "pause")
         elif at + LENGTH - self._since >= LONGEST:
-            told += self._ended(at + LENGTH) + self._began(at + LENGTH, at + LENGTH)
+            told += self._ended(at + LENGTH, "long") + self._began(at + LENGTH, at + LENGTH)
         return told
 
     def _began(self, onset: Seconds, at: Seconds) -> list[VoiceEvent]:
@@ -133,9 +139,9 @@ class VoiceEar:
         self._before.clear()
         return [VoiceBegan(onset), *([VoiceSound(np.concatenate(before))] if before else [])]
 
-    def _ended(self, at: Seconds) -> list[VoiceEvent]:
+    def _ended(self, at: Seconds, why: End) -> list[VoiceEvent]:
         since, self._since, self._count = self._since, None, 0
-        return [] if since is None else [VoiceEnded(max(since, at))]
+        return [] if since is None else [VoiceEnded(max(since, at), why)]
 
 
 def silero() -> Judge:

@@ -94,8 +94,8 @@ function wrong() {
 }
 
 async function begin(address) {
-  const [{ timed }, { finder }, { models }] = await Promise.all(["timed.js", "faces.js", "models.js"].map((name) => import(place(name))));
-  link = timed(address, { ended: (reason) => postMessage({ ended: reason }) });
+  const [{ SEAT_KEPT, timed }, { finder }, { models }] = await Promise.all(["timed.js", "faces.js", "models.js"].map((name) => import(place(name))));
+  link = timed(address, { patience: SEAT_KEPT, ended: (reason) => postMessage({ ended: reason }) });
   setInterval(() => postMessage({ wrong: wrong() }), LOOK);
   try {
     importScripts(place("../eyes/litert_wasm_compat_internal.js"));

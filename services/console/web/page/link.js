@@ -1,4 +1,6 @@
 // The link to the window: frames come, one when we say that we have drawn the last, and orders go.
+import { early } from "./early.js";
+import { KEPT, linkTo } from "./place.js";
 import { queue } from "./queue.js";
 
 const AGAIN = 1000; // ms from a broken link to the next try
@@ -6,14 +8,14 @@ const LOOK = 250; // ms between two looks at how the link is
 const SILENCE = 16; // looks without any frame after which the window is away
 const DEAD = 60; // looks without any frame after which the link is given up: that of a computer that changes its network never ends by itself
 const NOTED = 0.5; // seconds after which an order without an answer is shown
+const SHUTS = 1012; // code of RFC 6455 with which a window ends the links of all pages as it is shut
+export const ENDED = "the window has ended"; // the reason in this case, until there is a window again
 const LEAVES = 4001; // code with which the link of a page ends that may be loaded anew: its session stays for a while
 const OVER = 1000; // and of one that is over: its session ends
-const KEPT = `engage-session ${location.pathname}`; // the session, and orders that are left over, while the page is loaded anew; another path is another robot
 const clock = () => Date.now() / 1000; // goes on while a computer sleeps
 
 // take: gets each frame, and whether it is the first of a link. tell: whether the window is there, and why not. report: what was not done. wait: names of orders without an answer.
-// place: address of the frames.
-export function follow({ place: frames = "frames", take, tell, report, wait }) {
+export function follow({ take, tell, report, wait }) {
   let socket = null;
   let ended = false;
   let silent = 0; // looks since the last frame: time in which this page does not run, as that of a computer that sleeps, does not count
@@ -21,7 +23,7 @@ export function follow({ place: frames = "frames", take, tell, report, wait }) {
   let told = 0; // number of the last news of orders
   let last = null; // the last frame's time and ours, once the link is open
   const orders = queue(JSON.parse(sessionStorage.getItem(KEPT) ?? "null"));
-  sessionStorage.removeItem(KEPT);
+  sessionStorage.removeItem(KEPT); // with the orders that were left over
 
   const say = (reports) => reports.length && report(reports);
   function flush() {
@@ -31,10 +33,7 @@ export function follow({ place: frames = "frames", take, tell, report, wait }) {
   }
 
   function open() {
-    const place = new URL(frames, document.baseURI);
-    place.protocol = place.protocol.replace("http", "ws");
-    place.searchParams.set("session", orders.session);
-    const own = new WebSocket(place);
+    const own = new WebSocket(linkTo(orders.session));
     socket = own;
     last = null;
     own.onmessage = (message) => {
@@ -44,6 +43,7 @@ export function follow({ place: frames = "frames", take, tell, report, wait }) {
       silent = 0;
       reason = "";
       last = { frame: frame.now, heard: clock() };
+      early?.close(); // this link has taken its place
       if (isFirst && frame.session !== orders.session) told = 0;
       frame.told = frame.told?.filter((each) => each.number > told);
       told = frame.told?.at(-1)?.number ?? told;
@@ -57,7 +57,7 @@ export function follow({ place: frames = "frames", take, tell, report, wait }) {
     };
     own.onclose = (event) => {
       if (ended || own !== socket) return;
-      reason = event.reason;
+      reason = event.code === SHUTS || reason === ENDED ? ENDED : event.reason;
       last = null;
       if (reason) tell(false, reason);
       setTimeout(() => own === socket && open(), AGAIN);

@@ -1,5 +1,5 @@
 // A worker: takes the sound of a microphone from the ear, and sends it to the window with its instants, whatever the page does meanwhile.
-import { timed } from "./timed.js";
+import { SEAT_KEPT, timed } from "./timed.js";
 
 const RATE = 16000;
 const HEADER = 12; // bytes: the instant, and the number of the frame
@@ -27,9 +27,9 @@ function send({ frame, samples, ended }) {
   lags.push(ended - (Date.now() - here) - (1000 * frame) / rate - (1000 * samples.length) / RATE);
   if (lags.length > LAG) lags.shift();
   const at = link.there((1000 * frame) / rate + Math.min(...lags) - latency);
-  if (at === null) return; // the link is being made: nobody waits for what is said before the light
+  if (at === null && !number) return; // the link is being made: nobody waits for what is said before the light
   number += 1;
-  if (link.socket.readyState !== WebSocket.OPEN || link.socket.bufferedAmount > FULL) {
+  if (at === null || link.socket.readyState !== WebSocket.OPEN || link.socket.bufferedAmount > FULL) {
     lost += samples.length / RATE;
     lostAt = here;
     return;
@@ -53,7 +53,7 @@ function look() {
 
 onmessage = ({ data }) => {
   if (data.place) {
-    link = timed(data.place, { ended: (reason) => postMessage({ ended: reason }) });
+    link = timed(data.place, { patience: SEAT_KEPT, ended: (reason) => postMessage({ ended: reason }) });
     setInterval(() => postMessage({ wrong: look() }), LOOK);
   } else {
     ({ rate, latency } = data);

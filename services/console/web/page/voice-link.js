@@ -32,7 +32,9 @@ function flush() {
 onmessage = ({ data }) => {
   if (data.place) {
     link = timed(data.place, {
+      patience: Infinity, // a browser lets a page sound after a press only, so what was pressed once stays on
       heard,
+      broken: () => postMessage({ broken: true }),
       ready: () => postMessage({ ready: true }),
       ended: (reason) => postMessage({ ended: reason }),
     });

@@ -1,5 +1,4 @@
 // The robot's voice, heard in the page in step with its words, wherever else the robot's own sound goes.
-const AGAIN = 1000; // ms from a broken link to the next try
 const LOOK = 200; // ms between two looks at how the clocks of page and context stand
 const USUAL = 22050; // samples per second, until a voice has others
 const MISSED = 0.3; // seconds of sound that came too late, from which on that is told
@@ -65,15 +64,12 @@ export function voice(show) {
     if (!isSecureContext) return tell((words) => words.mute(words.plain)); // without an audio worklet
     const own = (on = { missed: 0, worker: new Worker(new URL("page/voice-link.js", document.baseURI), { type: "module" }) });
     tell();
-    const connect = () => own.worker.postMessage({ place: new URL("voice", document.baseURI).href });
     own.worker.onmessage = ({ data }) => {
       if (on !== own) return;
       if (data.rate) open(own, data.rate);
       if (data.ready) tell();
+      if (data.broken) tell((words) => words.again);
       if (data.ended) off((words) => words.mute(data.ended));
-      if (data.ended !== "") return;
-      tell((words) => words.again);
-      setTimeout(() => on === own && connect(), AGAIN);
     };
     own.worker.onerror = () => on === own && off((words) => words.mute(words.worker));
     own.timer = setInterval(() => {
@@ -82,7 +78,7 @@ export function voice(show) {
       if (news === LATE && performance.now() - own.lateAt > LATELY) tell();
     }, LOOK);
     open(own, USUAL); // at the press: later a browser may not let it sound
-    connect();
+    own.worker.postMessage({ place: new URL("voice", document.baseURI).href });
   }
   tell();
   return {
