@@ -78,9 +78,9 @@ def _from_here(path: Path) -> str:
 if TYPE_CHECKING:
     from importlib.metadata import Distribution, EntryPoint
 
-GROUPS = BODIES, VOICES, SERVICES, RECOGNIZERS, LANDMARKS, PIECES, TABLES, HEAD_POLICIES, TURN_ENDS = (
+GROUPS = BODIES, VOICES, SERVICES, RECOGNIZERS, LANDMARKS, PIECES, TABLES, HEAD_POLICIES, TURN_POLICIES, TURN_ENDS = (
     "engage.bodies", "engage.voices", "engage.services", "engage.recognizers", "engage.landmarks", "engage.pieces",
-    "engage.tables", "engage.head_policies", "engage.turn_ends",
+    "engage.tables", "engage.head_policies", "engage.turn_policies", "engage.turn_ends",
 )  # fmt: skip
 
 

@@ -58,7 +58,7 @@ from engage_hri.services.generation.block.rewriting import Operator, Rewriting, 
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.inhibitions import Permits
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation, Stroke, first_met, stroke
-from engage_hri.services.generation.turns.policy import TurnPlan
+from engage_hri.services.generation.turns.plan import TurnPlan
 
 _ALPHABETIC = r"""(?:['’](?:s|d|m|ll|re|ve)\b)?[.,;:!?…)\]"'”’»]*(?=\s|$)"""
 _IDEOGRAPHIC = "[、。，．；：！？…）］」』】》〉]+"

@@ -9,8 +9,7 @@ unseen: at the end of a turn the head must not fall back to where it was before.
 the head has that gaze aborted, the base gaze goes to its target: else the head would go home.
 """
 
-from collections.abc import Callable, Mapping
-from typing import TypeVar
+from collections.abc import Mapping
 
 from msgspec import Struct
 
@@ -22,8 +21,9 @@ from engage_hri.schemas.units import Degrees, Probability, Radians, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import Acquaintances
 from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.followed import Followed, arranged
 from engage_hri.services.generation.head.orders import FragmentPolicy, InhibitionPolicy
-from engage_hri.services.generation.head.policies import OWN, arranged
+from engage_hri.services.generation.head.policies import OWN
 from engage_hri.services.generation.head.policy import HeadPolicy
 from engage_hri.services.generation.head.scene import NOBODY, HeadScene, Observation
 from engage_hri.services.generation.inhibitions import Inhibition
@@ -47,7 +47,6 @@ RETRY: Seconds = 1.0
 all the time. Ours."""
 NOD: Probability = 0.3
 """How large a nod is that says no more than that the robot listens: less than an answer's. Ours."""
-Answer = TypeVar("Answer")
 UP_RIGHT: Degrees = 60.0
 """Angle past the table: as far as the neck turns, at nothing that anybody could mean. Thesis 5.3."""
 
@@ -131,15 +130,14 @@ class Arbiter:
         self._orders = InhibitionPolicy(scene, config)
         self._fragments = FragmentPolicy(scene, config)
         ordered = {InhibitionPolicy: self._orders, FragmentPolicy: self._fragments}
-        self._policies: list[HeadPolicy] = []
-        self.mistakes: list[tuple[str, Exception]] = []
-        """Policies that have raised, and what, until somebody takes them."""
+        followed: list[HeadPolicy] = []
         kinds: dict[str, int] = {}
-        for name, each in arranged(config, policies).items():
+        for name, each in arranged(OWN, policies, config.policies_off).items():
             policy = ordered.get(each) or each(scene, config)
             policy.name, policy.kind = name, policy.kind or name
             policy.priority = kinds.setdefault(policy.kind, len(kinds) + 1)
-            self._policies.append(policy)
+            followed.append(policy)
+        self.policies = Followed(followed)
         self._people = Acquaintances()
         self._since: Seconds = 0.0
         self._waiting: tuple[Claim, ...] | None = None
@@ -172,7 +170,7 @@ class Arbiter:
             case Statistics(actor=actor) if actor:
                 self._people.hear(actor, now)
         self._scene.feed(observation, now)
-        self._ask(lambda policy: policy.feed(observation, now))
+        self.policies.ask(lambda policy: policy.feed(observation, now))
 
     def gaze_perceived_within(self, half_angle: Radians) -> None:
         """Take the half angle of the body's gaze cone; one in the configuration goes before."""
@@ -222,7 +220,7 @@ class Arbiter:
     def join(self, other: str, name: str) -> None:
         """Take two ids for one person, who is called `name` from now on. The next world has nobody called `other`."""
         self._scene.join(other, name)
-        self._ask(lambda policy: policy.join(other, name))
+        self.policies.ask(lambda policy: policy.join(other, name))
         self._scene.owner = joined(self._owner, other, name)
         self._base, self._held = joined(self._base, other, name), joined(self._held, other, name)
 
@@ -244,13 +242,13 @@ class Arbiter:
     def recognition_lost(self) -> None:
         """Drop what recognition told: the ends of its events and speeches will never come."""
         self._scene.recognition_lost()
-        self._ask(lambda policy: policy.recognition_lost())
+        self.policies.ask(lambda policy: policy.recognition_lost())
 
     # -- what follows ---------------------------------------------------------------------------------------------
 
     @property
     def deadline(self) -> Seconds | None:
-        due = self._ask(lambda policy: policy.deadline)
+        due = self.policies.ask(lambda policy: policy.deadline)
         due.append(self._failed[1] if self._failed else None)
         if self._stays_until is not None:
             due.append(self._stays_until)
@@ -280,7 +278,7 @@ class Arbiter:
                 self._since = now
         state = self._scene.state
         self._scene.head_on = owner.target or (state.looking_at if state else "") or self._base.target
-        self._ask(lambda policy: policy.has_head(owner.kind == policy.kind, now))
+        self.policies.ask(lambda policy: policy.has_head(owner.kind == policy.kind, now))
         self._waiting = tuple(claim for claim in claims if claim.kind != owner.kind)
         changed = owner != before or self._waiting != waited
         return Ruling(owner, self._since, self._waiting, changed, self._shift(now), self._nod(now))
@@ -293,7 +291,7 @@ class Arbiter:
 
     def _forget(self, person: str) -> None:
         self._scene.sight.forget(person)
-        self._ask(lambda policy: policy.forget(person))
+        self.policies.ask(lambda policy: policy.forget(person))
 
     def _claims(self, now: Seconds) -> list[Claim]:
         """Claims of the policies, the strongest first, one of each kind."""
@@ -304,21 +302,8 @@ class Arbiter:
             if claim is not None:
                 claims[:] = [claim, *(each for each in claims if each.kind != claim.kind)]
 
-        self._ask(ask)
+        self.policies.ask(ask)
         return claims
-
-    def _ask(self, question: Callable[[HeadPolicy], Answer]) -> list[Answer]:
-        """Ask all policies, the weakest first, or tell them. A mistake of ours is raised, one of others is noted."""
-        answers = []
-        for policy in self._policies[::-1]:
-            try:
-                answers.append(question(policy))
-            except Exception as error:
-                if type(policy) in OWN.values():
-                    raise
-                self._policies.remove(policy)
-                self.mistakes.append((policy.name, error))
-        return answers
 
     def _next_owner(self, claims: list[Claim], now: Seconds) -> Claim:
         """The claim that gets the head, or still the owner while its look is too short."""
@@ -372,7 +357,7 @@ class Arbiter:
     def _nod(self, now: Seconds) -> Nod | None:
         if self._owner.kind in (InhibitionPolicy.kind, FragmentPolicy.kind):
             return None
-        for person in filter(None, self._ask(lambda policy: policy.nods(now))):
+        for person in filter(None, self.policies.ask(lambda policy: policy.nods(now))):
             self._nods += 1
             return Nod(f"nod-{self._nods}", person)
         return None
