@@ -67,7 +67,7 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """Names of policies that the robot does not follow. Of the head: "glance", "aversion" (it looks away from faces),
     "response", "mutual" (it keeps eyes that it has met), "listening" (it looks at who speaks), "hands", "face",
     "nods". Of turns: "leaving" (a turn ends when its addressees have gone), "silence" (when its client sends no
-    more), "interruption". Or one of an installed package."""
+    more), "interruption", "next-speaker" (to whom of several it gives the turn). Or one of an installed package."""
     decision_patience: Seconds = 8.0
     """Seconds after a block's end for which undecided connection events may delay the fragment's outcome. Ours."""
     glance_factor: float = 1.0

@@ -3,10 +3,12 @@
 from collections.abc import Mapping
 
 from engage_hri.services.generation.turns.endings import InterruptionPolicy, LeavingPolicy, SilencePolicy
+from engage_hri.services.generation.turns.next_speaker import NextSpeakerPolicy
 from engage_hri.services.generation.turns.policy import TurnPolicy
 
 OWN: Mapping[str, type[TurnPolicy]] = {
     "leaving": LeavingPolicy,
     "silence": SilencePolicy,
     "interruption": InterruptionPolicy,
+    "next-speaker": NextSpeakerPolicy,
 }
