@@ -399,7 +399,8 @@ class Fragments:
             body = self._body.capabilities
             if body is not None:
                 self._arbiter.gaze_perceived_within(body.gaze_half_angle)
-            before = reduce(Continuation.then, (each.continuation for each in followed), NO_CONTINUATION)
+            rests = NO_CONTINUATION if followed else self._arbiter.rest(self._now)
+            before = reduce(Continuation.then, (each.continuation for each in followed), rests)
             heard, permitted, config = self._heard_in(turn), permits(), self._config
             reachable = without(motions, bars)
             try:

@@ -36,7 +36,14 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import COVERED_FOR, CoveredObjects, World
 from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.exchange import NAME, AnswerCame, GenerationBegan, OwnSight, SendRequest
+from engage_hri.services.generation.exchange import (
+    NAME,
+    AnswerCame,
+    CancelRequest,
+    GenerationBegan,
+    OwnSight,
+    SendRequest,
+)
 from engage_hri.services.generation.fragment_check import lacks_people
 from engage_hri.services.generation.fragments import Fragments
 from engage_hri.services.generation.head.arbiter import Arbiter, Nod, Shift
@@ -382,6 +389,9 @@ class GenerationIntake:
             since = Stamp(self._clock.name, ruling.since)
             self._publish(keys.HEAD_OWNER, HeadOwner(owner=ruling.owner, since=since, waiting=ruling.waiting))
         if ruling.shift is not None:
+            why = Fault(reason="the head is to go elsewhere", cause="cancelled", whose=NAME)
+            # A shift waits for the one before it: the eyes would come to where they are not to be, and leave at once.
+            self._outputs += [CancelRequest(id, why) for id in self._shifts]
             self._shifts[self._send(ruling.shift)] = ruling.shift.id
         if ruling.nod is not None:
             self._send(ruling.nod)

@@ -16,6 +16,7 @@ from engage_hri.schemas.behaviors import (
     Timing,
 )
 from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.services.generation.turns.continuation import Continuation
 from tests.generation.emitted import LOOK, POINT, Made, block, by_id, lines, reference, speech
 
 # -- profile check-back -----------------------------------------------------------------------------------------
@@ -327,3 +328,13 @@ def test_a_speech_that_its_author_has_timed_is_left_alone() -> None:
     fragment = TurnFragment(id="f", behaviors=(speech("s1"), timed))
 
     assert not [line for line in lines(block(fragment)) if line.startswith("s2:start")]
+
+
+@pytest.mark.parametrize(("target", "waits"), [("piece", ["look start"]), ("human", [])])
+def test_the_first_look_waits_until_what_the_eyes_have_just_come_to_was_seen(target: str, waits: list[str]) -> None:
+    fragment = TurnFragment(id="f", turn_status="full", behaviors=(Gaze(id="look", target=target), speech("s")))
+    before = Continuation(seen_after=0.2, eyes_on="human")
+
+    made = lines(block(fragment, before=before), "eyes-rest")
+
+    assert made == [f"{each.replace(' ', ':')} after bml:start+0.2" for each in waits]

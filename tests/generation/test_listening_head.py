@@ -225,7 +225,7 @@ def seek_eyes(stage: Stage, who: str, state: str) -> None:
 
 def test_a_look_at_a_face_lasts_though_others_speak_and_look_in_turns() -> None:
     stage = company()
-    speak(stage, 10.0, "ben")
+    stage.feed(Floor(at=AT, speeches=(FloorSpeech(actor="ben", since=AT, to=("ann",)),)))
     stage.until(10.7)
     for state in ("started", "failed", "started"):
         seek_eyes(stage, "cem", state)
@@ -253,6 +253,37 @@ def test_a_brief_look_is_left_for_a_place_and_for_a_fragment() -> None:
     assert points.shifts[-1][::2] == (10.7, "cup")
     gazes.do(lambda arbiter: arbiter.fragment_gazes("cem"))
     assert gazes.owners[-1] == (10.7, "fragment", "cem")
+
+
+def test_who_may_be_speaking_to_it_keeps_its_eyes_whoever_else_seeks_them() -> None:
+    stage = company()
+    speak(stage, 10.0, "ben")
+    stage.until(12.0)
+    seek_eyes(stage, "cem", "started")
+    stage.until(14.0)
+    assert looks(stage) == [(10.3, "ben")]
+
+    speak(stage, 14.0)
+    stage.until(16.0)
+    assert looks(stage)[1:] == [(14.0, "cem")]
+
+
+def test_who_answers_is_looked_at_at_once_though_the_head_has_just_gone_on_to_another() -> None:
+    stage = company()
+    for each in ("ann", "ben"):
+        pair = event(f"ask-{each}", "started", kind="adjacency_pair", initiator="robot", responder=each, objects=())
+        stage.feed(pair)
+    stage.do(lambda arbiter: arbiter.wait_for_answers())
+    stage.until(12.0)
+    at, other = looks(stage)[-1]
+    assert at > 10.0
+    stage.until(at + 1.2)
+    at, other = looks(stage)[-1]
+    answers = "ann" if other == "ben" else "ben"
+    speak(stage, at + 0.1, answers)
+    stage.until(at + 1.0)
+
+    assert looks(stage)[-1] == (pytest.approx(at + 0.4), answers)
 
 
 def test_after_a_fragments_brief_look_at_a_face_the_head_stays_there_too() -> None:
@@ -313,3 +344,16 @@ async def test_a_whole_robot_turns_to_who_speaks_but_not_while_it_waits_for_anot
         assert (first, second, third) == ("ann", "ben", "ann")
         assert 0.3 <= turned <= 0.8
         assert 3.0 <= back <= 4.5
+
+
+def test_what_the_eyes_have_come_to_is_to_be_seen_before_a_fragment_takes_them_away() -> None:
+    stage = company()
+    seen = []
+    for at in (10.0, 10.3, 10.4, 10.6, 10.7):
+        speak(stage, at, "ben")
+        told = stage.arbiter.rest(at)
+        seen.append((at, told.eyes_on, round(told.seen_after, 6)))
+
+    assert seen == [
+        (10.0, "ann", 0.0), (10.3, "ben", 0.3), (10.4, "ben", 0.2), (10.6, "ben", 0.0), (10.7, "ben", 0.0)
+    ]  # fmt: skip

@@ -2,11 +2,14 @@
 
 The claims are those of the policies, in the order of `policies.py`. A higher claim takes over at once; when the
 owner lets go the head stays for a dwell before a lower claim gets it. From a face that it has just gone to it goes
-to another one by a higher claim than those of the people (response, face) only. Policies move the base gaze by
-`gazeShift` blocks, which end on arrival and hold nothing. A fragment's own gaze lies over the base gaze: while it
-owns the head no shift is sent, with two exceptions. While that gaze is on a face the base gaze goes there, too,
-unseen: at the end of a turn the head must not fall back to where it was before. And when an inhibition that holds
-the head has that gaze aborted, the base gaze goes to its target: else the head would go home.
+to another one by a higher claim only: whoever answers is looked at at once, though the head has just gone on to
+another one of those who may answer, and of several who speak and look none draws it away from the other.
+
+Policies move the base gaze by `gazeShift` blocks, which end on arrival and hold nothing. A fragment's own gaze lies
+over the base gaze: while it owns the head no shift is sent, with two exceptions. While that gaze is on a face the
+base gaze goes there, too, unseen: at the end of a turn the head must not fall back to where it was before. And when
+an inhibition that holds the head has that gaze aborted, the base gaze goes to its target: else the head would go
+home.
 """
 
 from collections.abc import Mapping
@@ -27,6 +30,7 @@ from engage_hri.services.generation.head.policies import OWN
 from engage_hri.services.generation.head.policy import HeadPolicy
 from engage_hri.services.generation.head.scene import NOBODY, HeadScene, Observation
 from engage_hri.services.generation.inhibitions import Inhibition
+from engage_hri.services.generation.turns.continuation import Continuation
 from engage_hri.services.reports.same_people import joined
 
 DWELL: Seconds = 0.3
@@ -39,7 +43,7 @@ takes the head elsewhere: below it nobody has seen anything, and people's eyes t
 ON_THE_WAY: Seconds = 2.0
 """Time after which a look counts as over of which nobody has told that it arrived: a body may be held up. Ours."""
 LEAST_LOOK: Seconds = 0.8
-"""Time for which a look at a face lasts at least before a claim from response down takes the head to another face: of
+"""Time for which a look at a face lasts at least before a claim that is no higher takes the head to another face: of
 several people who speak and look, the claims change faster than a head may. People's looks at who speaks last about a
 second. Ours."""
 RETRY: Seconds = 1.0
@@ -226,7 +230,8 @@ class Arbiter:
 
     def shift_arrived(self, id: str, now: Seconds) -> None:
         """Note that shift `id` is at its target: a body need not tell what its eyes rest on."""
-        if id.rpartition("-")[2] == str(self._shifts) and self._rests_since is None:
+        is_beneath = self._owner.kind == FragmentPolicy.kind
+        if id.rpartition("-")[2] == str(self._shifts) and self._rests_since is None and not is_beneath:
             self._rests_since = now
 
     def shift_failed(self, id: str, now: Seconds) -> None:
@@ -321,9 +326,17 @@ class Arbiter:
         rests = self._rests_since
         ends = self._looks_since + ON_THE_WAY if rests is None else rests + LEAST_FIXATION
         faces = {self._owner.target, wanted.target}
-        if faces <= {*self._scene.sight.present(now)} and wanted.kind in ("response", "face"):
+        is_stronger = wanted.priority < self._owner.priority
+        if faces <= {*self._scene.sight.present(now)} and wanted.kind in ("response", "face") and not is_stronger:
             return max(ends, self._looks_since + LEAST_LOOK)
         return ends
+
+    def rest(self, now: Seconds) -> Continuation:
+        """The time until what the eyes rest on has been looked at for long enough; none if they are on their way."""
+        rests, on = self._rests_since, self._owner.target
+        return Continuation(
+            eyes_on=on, seen_after=max(rests + LEAST_FIXATION - now, 0.0) if rests is not None else 0.0
+        )
 
     def _strongest(self, claims: list[Claim], now: Seconds) -> Claim:
         best = claims[0] if claims else NOBODY
