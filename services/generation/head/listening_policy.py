@@ -13,9 +13,9 @@ from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.head.policy import HeadPolicy
 from engage_hri.services.generation.head.scene import HeadScene, Observation
 
-ONSET: Seconds = 0.3
-"""Time for which somebody has to speak until the robot looks there: people react after 0.2 to 0.4 s. What is said
-into the speech of another, as most of "uh-huh" is, draws nobody's look anyway."""
+ONSET: Seconds = 0.2
+"""Time for which somebody has to speak until the robot looks there: people react after 0.2 to 0.4 s, and a speech to
+the robot is short. What is said into the speech of another, as most of "uh-huh" is, draws nobody's look anyway."""
 STAYS: Seconds = 1.0
 """Time after a speech for which the robot still looks at the speaker: most who pause go on. Ours."""
 
