@@ -85,8 +85,10 @@ def test_a_policy_of_others_gets_the_head_in_its_place_and_only_then() -> None:
     with_piece = staged(piece=Piece)
     with_piece.until(22.0)
     assert with_piece.owners[-1] == (20.0, "piece", "piece")
-    assert with_piece.rulings[-1].owner.priority == 3
-    assert [claim.priority for claim in with_piece.rulings[-1].waiting if claim.kind == "face"] == [7]
+    places = {policy.kind: policy.priority for policy in staged().arbiter.policies}
+    assert with_piece.rulings[-1].owner.priority == places["glance"]
+    waiting = [claim.priority for claim in with_piece.rulings[-1].waiting if claim.kind == "face"]
+    assert waiting == [places["face"] + 1]
 
     with_piece.do(lambda arbiter: arbiter.fragment_gazes("other"))
     assert with_piece.owner == "fragment"
