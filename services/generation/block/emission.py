@@ -250,9 +250,12 @@ class Emission:
         )
 
     def _let_the_eyes_rest(self, behaviors: Sequence[BlockBehavior]) -> None:
-        """Let the first look wait until what the eyes have just come to has been seen."""
+        """Let the first look wait until what the eyes have just come to has been seen, unless its author times it."""
         first = next((each for each in behaviors if isinstance(each, Gaze)), None)
-        if self.before.seen_after and first is not None and first.target != self.before.eyes_on:
+        if not self.before.seen_after or first is None or first.target == self.before.eyes_on:
+            return
+        source = next((id for id, parts in self.parts.items() if parts.gaze == first.id), first.id)
+        if not self.rewriting.is_timed(source, self.named):
             rested = after(f"bml:start+{self.before.seen_after:g}", f"{first.id}:start")
             self.constraints.append(Constraint(id=self.names.fresh("eyes-rest"), operators=(rested,)))
 
