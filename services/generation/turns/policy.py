@@ -78,10 +78,18 @@ class TurnPolicy:
         self.name, self.scene, self.config = name, scene, config
 
     def feed(self, message: News, now: Seconds) -> None:
-        """Take what people do. now: in seconds."""
+        """Take what people do.
+
+        message: who is in sight, what they say into the robot's turns, their words, the ends of what they do.
+        now: in seconds.
+        """
 
     def amended(self, plan: TurnPlan, fragment: TurnFragment) -> TurnPlan:
-        """Return what a fragment adds to the conversation. plan: by Table 3.1 and the policies that come after."""
+        """Return what a fragment adds to the conversation.
+
+        plan: what it adds by Table 3.1 and the policies that come after.
+        fragment: as its manager has sent it.
+        """
         return plan
 
     @property
@@ -90,11 +98,19 @@ class TurnPolicy:
         return {}
 
     def ending(self, now: Seconds, due: Collection[Hashable]) -> EarlyEnd | None:
-        """Return a turn that ends early now; None: there is none. due: names of limits that have passed, in order."""
+        """Return a turn that ends early now; None: there is none.
+
+        now: in seconds.
+        due: names of limits that have passed, in order.
+        """
         return None
 
     def ends(self, plan: TurnPlan, reason: str) -> EarlyEnd:
-        """Return the end of a turn. reason: in words, for people."""
+        """Return the end of a turn.
+
+        plan: what it was accepted as.
+        reason: in words, for people.
+        """
         return EarlyEnd(plan, Fault(reason=reason))
 
     @property
