@@ -71,6 +71,7 @@ if TYPE_CHECKING:
     from engage_hri.services.control.contract.body import MovementAuthority as MovementAuthority
     from engage_hri.services.control.contract.body import Reached as Reached
     from engage_hri.services.generation.head.policy import HeadPolicy as HeadPolicy
+    from engage_hri.services.generation.turns.policy import TurnPolicy as TurnPolicy
 
 _PLACES = {
     "engage_hri.schemas.behaviors": ("Gaze", "Head", "Pointing", "Reference", "Speech", "SpeechOption"),
@@ -105,6 +106,7 @@ _PLACES = {
     "engage_hri.services.control.bases.setpoints": ("SetPointBody", "SimulatedServos"),
     "engage_hri.services.client.language_models": ("perform_call", "stream"),
     "engage_hri.services.generation.head.policy": ("HeadPolicy",),
+    "engage_hri.services.generation.turns.policy": ("TurnPolicy",),
 }
 _MODULES = {name: module for module, names in _PLACES.items() for name in names}
 
@@ -151,6 +153,7 @@ __all__ = [
     "Summary",
     "TurnAnswer",
     "TurnFragment",
+    "TurnPolicy",
     "Utterance",
     "World",
     "connect",

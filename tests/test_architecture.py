@@ -77,8 +77,8 @@ LAYERS = {
     "services/commandline": "look robot study talk > app bodies embedding > shell",
     "services/client": "conversation > language_models > robot > heard turn > known_objects outcomes > performing"
     " > orders > feeds people > chunking event_stream inputs turn_ends",
-    "services/generation": "service > intake > fragments > performance > acts > fragment_check pipeline"
-    " > block exchange head > references turns > inhibitions > config",
+    "services/generation": "service > intake > fragments policies > performance > acts > fragment_check pipeline"
+    " > block exchange head > references turns > followed inhibitions > config",
     "services/realizer": "service > perform > export together > report > decide > foresee > plan > net"
     " > config points",
     "services/recognition": "service > former_life intake > recognizer > perceive statistics > events > config",

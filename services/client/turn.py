@@ -24,6 +24,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Action
+from engage_hri.schemas.blocks import BlockProgress
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused, OutcomeUnknown
 from engage_hri.schemas.fragments import FragmentOutcome, ReferenceMade, TurnClosed, TurnFragment, TurnStatus
@@ -52,10 +53,7 @@ ANSWER_WITHIN: Seconds = 6.0
 """Time for the answer to a question, as recognition has it for a reply."""
 T = TypeVar("T")
 Change = Callable[[TurnFragment], TurnFragment]
-
-
-def _unchanged(fragment: TurnFragment) -> TurnFragment:
-    return fragment
+_UNCHANGED: Change = replace
 
 
 def _asking(within: Seconds, expects: Expects) -> Change:
@@ -112,7 +110,7 @@ class RobotTurn:
         self._turn = turn
         self._chunker = chunker or Chunker()
         self._is_awaited = await_answer
-        self._question: Change = _unchanged
+        self._question: Change = _UNCHANGED
         self._fragments: list[TurnFragment] = []
         self._performing: list[asyncio.Task[FragmentOutcome]] = []
         self._sent: dict[str, Pending] = {}
@@ -123,6 +121,9 @@ class RobotTurn:
         """Those of each fragment."""
         self._first: dict[str, Seconds] = {}
         """When the first word of each fragment was over."""
+        self._going: set[str] = set()
+        """Fragments whose blocks have begun and not ended."""
+        self._begins = asyncio.Event()
         self._news = asyncio.Event()
         """Set when there is another word, or the turn is over."""
         self._line = asyncio.Lock()
@@ -206,7 +207,7 @@ class RobotTurn:
         self._unsettle()
         ids = await self._objects.ids(is_needed=isinstance(piece, str) and "[" in piece)
         for chunk in self._chunker.feed(piece, ids):
-            self._go_on(chunk)
+            self._send(chunk, "middle")
         self._settling = asyncio.get_running_loop().call_later(SETTLED, self._settle, ids)
 
     async def flush(self) -> None:
@@ -214,7 +215,7 @@ class RobotTurn:
         self._check()
         self._unsettle()
         if chunk := self._chunker.rest(await self._objects.ids(is_needed=False)):
-            self._go_on(chunk)
+            self._send(chunk, "middle")
 
     async def spoken(self) -> None:
         """Wait until the robot has said and done all that it was given so far."""
@@ -249,6 +250,15 @@ class RobotTurn:
                 self._robot._requests.cancel(self._sent[id].request.id, "the turn was stopped")
         if self._performing:
             await asyncio.wait(self._performing, timeout=STOP_PATIENCE)
+
+    @property
+    def is_performed(self) -> bool:
+        """True while something of it is being said or shown."""
+        return bool(self._going)
+
+    async def begun(self) -> None:
+        """Wait until the robot begins to say or show something of it."""
+        await self._begins.wait()
 
     async def words(self) -> AsyncIterator[str]:
         """Follow the words as they are spoken, from the first one, until the turn is over."""
@@ -350,9 +360,9 @@ class RobotTurn:
         self._robot._requests.check()
         self._worlds = WorldFeed(self._robot._bus)
         self._objects = KnownObjects(self._worlds, self._robot.now)
-        kinds = (TurnClosed, PeerAlive, PeerGone, WordSpoken)
-        self._told: Feed[TurnClosed | PeerAlive | PeerGone | WordSpoken] = self._robot._feed(
-            kinds, keys.TURN_CLOSED, keys.ANY_ROBOT_ALIVE, keys.SYNC_POINT
+        kinds = (TurnClosed, PeerAlive, PeerGone, WordSpoken, BlockProgress)
+        self._told: Feed[TurnClosed | PeerAlive | PeerGone | WordSpoken | BlockProgress] = self._robot._feed(
+            kinds, keys.TURN_CLOSED, keys.ANY_ROBOT_ALIVE, keys.SYNC_POINT, keys.FEEDBACK
         )
         self._watching = asyncio.create_task(self._watch(), name=f"turn {self.id}")
         await self._objects.ids(is_needed=False)
@@ -390,11 +400,8 @@ class RobotTurn:
         try:
             await self.spoken()
             statuses = [each.status for each in self._done().values()]
-            if (
-                "refused" in statuses[1:]
-                and statuses[0] != "refused"
-                and not {"interrupted", "unknown"} & {*statuses}
-            ):
+            is_over = statuses[:1] == ["refused"] or {"interrupted", "unknown"} & {*statuses}
+            if "refused" in statuses and not is_over:
                 with suppress(EngageError):  # there was none
                     await self._robot.perform(self._fragment((), "end"))
         except asyncio.CancelledError:
@@ -455,7 +462,7 @@ class RobotTurn:
         pieces: Iterable[Piece],
         status: TurnStatus,
         result: Callable[[FragmentOutcome], T],
-        change: Change = _unchanged,
+        change: Change = _UNCHANGED,
     ) -> Sent[T]:
         """Send what was written before and these pieces, complete, as one fragment."""
         ids, parts = self._objects.known, []
@@ -490,17 +497,9 @@ class RobotTurn:
     def _settle(self, ids: Ids) -> None:
         """Send what is finished, since no piece comes."""
         for chunk in self._chunker.settled(ids):
-            self._go_on(chunk)
+            self._send(chunk, "middle")
 
-    def _go_on(self, chunk: Chunk) -> None:
-        self._send(chunk, "middle")
-
-    def _send(
-        self,
-        chunk: Chunk,
-        status: TurnStatus,
-        change: Change = _unchanged,
-    ) -> "asyncio.Task[FragmentOutcome]":
+    def _send(self, chunk: Chunk, status: TurnStatus, change: Change = _UNCHANGED) -> "asyncio.Task[FragmentOutcome]":
         self._is_finished = status == "end"
         if not self._fragments:
             status = "full" if self._is_finished else "beginning"
@@ -566,6 +565,9 @@ class RobotTurn:
             match await self._told.next(patience):
                 case WordSpoken() as word:
                     self._hear(word)
+                case BlockProgress(block=str(block), progress=progress) if block in self._sent:
+                    (self._going.add if progress == "start" else self._going.discard)(block)
+                    self._begins.set()
                 case TurnClosed(status="aborted") as closed if closed.turn == f"{self.id}-1":
                     if self._body is not None:
                         self._closed, self._is_broken = closed, True

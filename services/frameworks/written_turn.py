@@ -10,12 +10,10 @@ import asyncio
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 
-from engage_hri.schemas.blocks import BlockProgress, Feedback
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.schemas.fragments import FragmentOutcome
 from engage_hri.schemas.summary import Summary, summary
 from engage_hri.schemas.tool import ToolInput
-from engage_hri.services.client.feeds import Feed
 from engage_hri.services.client.language_models import PLAIN_TURN, summary_of
 from engage_hri.services.client.robot import Robot
 from engage_hri.services.client.turn import Piece, RobotTurn
@@ -43,7 +41,6 @@ class WrittenTurn:
         on_word: Callable[[str], None] = lambda word: None,
     ) -> None:
         self.id = id
-        self._robot = robot
         self._turn = RobotTurn(robot, id, turn, await_answer=await_answer)
         self._on_start = on_start
         self._on_word = on_word
@@ -51,8 +48,6 @@ class WrittenTurn:
         self._written = 0
         self._is_ended = self._is_stopped = False
         self._speaking: asyncio.Task[None] | None = None
-        self._live: dict[str, None] = {}
-        """Its blocks that have begun and not ended, in order."""
         self._task = asyncio.create_task(self._run(), name=f"turn {id}")
 
     @property
@@ -116,24 +111,23 @@ class WrittenTurn:
             raise
 
     def _check_live(self) -> None:
-        if not self._live:
+        if not self._turn.is_performed:
             raise InputRefused(Fault(reason="nothing of it is being said", where=self.id))
 
     async def _run(self) -> Summary:
-        with self._robot.feedback() as feedback:
-            following = asyncio.create_task(self._follow(feedback), name=f"blocks of {self.id}")
-            hearing = asyncio.create_task(self._hear(), name=f"words of {self.id}")
-            self._speaking = asyncio.create_task(self._speak(), name=f"speech of {self.id}")
-            try:
-                with suppress(asyncio.CancelledError):  # it was stopped, which is no error of whoever waits
-                    await self._speaking
-                return summary(*self._turn.outcomes, *self._never_written())
-            except EngageError as error:
-                return summary_of(error)
-            finally:
-                for task in (following, hearing):
-                    task.cancel()
-                await asyncio.wait([following, hearing])
+        beginning = asyncio.create_task(self._begin(), name=f"start of {self.id}")
+        hearing = asyncio.create_task(self._hear(), name=f"words of {self.id}")
+        self._speaking = asyncio.create_task(self._speak(), name=f"speech of {self.id}")
+        try:
+            with suppress(asyncio.CancelledError):  # it was stopped, which is no error of whoever waits
+                await self._speaking
+            return summary(*self._turn.outcomes, *self._never_written())
+        except EngageError as error:
+            return summary_of(error)
+        finally:
+            for task in (beginning, hearing):
+                task.cancel()
+            await asyncio.wait([beginning, hearing])
 
     def _never_written(self) -> Iterator[FragmentOutcome]:
         """Outcome of what was still in line when the turn was stopped: the turn itself knows nothing of it."""
@@ -155,19 +149,6 @@ class WrittenTurn:
         async for word in self._turn.words():
             self._on_word(word)
 
-    async def _follow(self, feedback: Feed[Feedback]) -> None:
-        has_begun = False
-        async for told in feedback:
-            if not isinstance(told, BlockProgress) or told.block is None or not self._is_own(told.block):
-                continue
-            if told.progress == "end":
-                self._live.pop(told.block, None)
-                continue
-            self._live[told.block] = None
-            if not has_begun:
-                has_begun = True
-                self._on_start()
-
-    def _is_own(self, block: str) -> bool:
-        name, _, number = block.rpartition("-")
-        return name == self.id and number.isdecimal()
+    async def _begin(self) -> None:
+        await self._turn.begun()
+        self._on_start()

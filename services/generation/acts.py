@@ -27,7 +27,7 @@ from engage_hri.services.generation.block.emission import FragmentPlan
 from engage_hri.services.generation.block.parts import Made
 from engage_hri.services.generation.fragment_check import names
 from engage_hri.services.generation.references.motions import Motions
-from engage_hri.services.generation.turns.policy import TurnPlan
+from engage_hri.services.generation.turns.plan import TurnPlan
 from engage_hri.services.text.ear import is_spoken, said
 
 DECIDED = ("succeeded", "completed", "failed")

@@ -64,9 +64,10 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """Seconds of voice after which who speaks into the robot's turn takes the floor, though recognition has not yet
     decided what it is. None: the robot waits for that in silence, and a laugh never takes the floor."""
     policies_off: tuple[str, ...] = ()
-    """Names of policies of the head that the robot does not follow: "glance", "aversion" (it looks away from a face),
+    """Names of policies that the robot does not follow. Of the head: "glance", "aversion" (it looks away from faces),
     "response", "mutual" (it keeps eyes that it has met), "listening" (it looks at who speaks), "hands", "face",
-    "nods", or one of an installed package."""
+    "nods". Of turns: "leaving" (a turn ends when its addressees have gone), "silence" (when its client sends no
+    more), "interruption", "next-speaker" (to whom of several it gives the turn). Or one of an installed package."""
     decision_patience: Seconds = 8.0
     """Seconds after a block's end for which undecided connection events may delay the fragment's outcome. Ours."""
     glance_factor: float = 1.0

@@ -5,7 +5,7 @@ other. While a fragment goes on, what its references were chosen for may move or
 again.
 """
 
-from collections.abc import Callable, Collection, Generator
+from collections.abc import Callable, Collection, Generator, Mapping
 from functools import reduce
 from typing import Any, Literal
 
@@ -45,6 +45,7 @@ from engage_hri.services.generation.acts import (
 )
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.exchange import NAME, CancelRequest, NoAnswer, SendRequest, Way, Ways
+from engage_hri.services.generation.followed import Followed
 from engage_hri.services.generation.fragment_check import bearable, check_world, performable
 from engage_hri.services.generation.head.arbiter import Arbiter
 from engage_hri.services.generation.inhibitions import Leases, Permits
@@ -54,7 +55,9 @@ from engage_hri.services.generation.references.phrases import NO_DISCOURSE, Disc
 from engage_hri.services.generation.references.policy import Unreferable
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.outcomes import HeardWords, TurnEvents, TurnOutcomes
-from engage_hri.services.generation.turns.policy import Aborted, TurnPlan, TurnPolicy
+from engage_hri.services.generation.turns.plan import TurnPlan
+from engage_hri.services.generation.turns.policy import TurnPolicy
+from engage_hri.services.generation.turns.robot_turns import Aborted, RobotTurns
 from engage_hri.services.requests.serving import GRACE
 from engage_hri.services.runtime.intake import AnswerRequest, MachineClocks, PublishMessage, TellMistake
 
@@ -82,8 +85,12 @@ class Fragments:
         arbiter: Arbiter,
         leases: Leases,
         tell: Callable[[Struct], None],
+        policies: Mapping[str, type[TurnPolicy]],
     ) -> None:
-        """session: part of each request id, so that the ids differ after a restart. tell: called with each output."""
+        """session: part of each request id, so that the ids differ after a restart. tell: called with each output.
+
+        policies: of turns, of installed packages.
+        """
         self._robot = robot
         self._config = config
         self._clock = clock
@@ -93,7 +100,7 @@ class Fragments:
         self._tell = tell
         self._now: Seconds = 0.0
         """Time of this step."""
-        self._turns = TurnPolicy(sight, config.barge_in)
+        self._turns = RobotTurns(robot, config, policies, sight)
         self._events = TurnEvents()
         self._heard = HeardWords()
         self._outcomes = TurnOutcomes(self._events, self._heard, self._turns.interjections, config, sight)
@@ -109,6 +116,10 @@ class Fragments:
         self._signals = self._holds = 0
         self._waits = Silences[tuple[str, str]](sight)
         """Times until which recognition may be away, and until which it is to decide the events of a request."""
+
+    @property
+    def policies(self) -> Followed[TurnPolicy]:
+        return self._turns.policies
 
     # -- what arrives ---------------------------------------------------------------------------------------------
 
@@ -162,14 +173,12 @@ class Fragments:
         match message:
             case World():
                 self._world = message
-                self._turns.see([person.id for person in message.people], now)
+                self._turns.feed(message, now)
             case ConnectionEvent():
                 self._events.feed(message, now)
                 self._discourse = self._discourse.hearing(message, self._robot)
-            case Interjection():
-                self._turns.interject(message, now)
-            case ActionEnded(action="speak"):
-                self._turns.interjections.falls_silent(message.actor)
+            case Interjection() | ActionEnded():
+                self._turns.feed(message, now)
             case SyncPointProgress():
                 self._follow(message, now)
             case WordSpoken(block=block):
@@ -178,7 +187,7 @@ class Fragments:
                         performance.hear(message)
             case Utterance() if message.actor != self._robot:
                 self._heard.feed(message, now)
-                self._turns.hear(message, now)
+                self._turns.feed(message, now)
 
     def rename(self, name: Callable[[str], str]) -> None:
         """Speak to people by other ids from now on. name: the new one of each."""
@@ -390,7 +399,8 @@ class Fragments:
             body = self._body.capabilities
             if body is not None:
                 self._arbiter.gaze_perceived_within(body.gaze_half_angle)
-            before = reduce(Continuation.then, (each.continuation for each in followed), NO_CONTINUATION)
+            rests = NO_CONTINUATION if followed else self._arbiter.rest(self._now)
+            before = reduce(Continuation.then, (each.continuation for each in followed), rests)
             heard, permitted, config = self._heard_in(turn), permits(), self._config
             reachable = without(motions, bars)
             try:

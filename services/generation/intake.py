@@ -8,7 +8,7 @@ Given the same inputs in the same order, at the same instants and by the same cl
 nothing in here reads a clock, waits, or asks anybody by itself (services/runtime/intake.py says why).
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Literal, TypeGuard, get_args
 
@@ -36,12 +36,19 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.schemas.world import COVERED_FOR, CoveredObjects, World
 from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.exchange import NAME, AnswerCame, GenerationBegan, OwnSight, SendRequest
+from engage_hri.services.generation.exchange import (
+    NAME,
+    AnswerCame,
+    CancelRequest,
+    GenerationBegan,
+    OwnSight,
+    SendRequest,
+)
 from engage_hri.services.generation.fragment_check import lacks_people
 from engage_hri.services.generation.fragments import Fragments
 from engage_hri.services.generation.head.arbiter import Arbiter, Nod, Shift
-from engage_hri.services.generation.head.policy import HeadPolicy
 from engage_hri.services.generation.inhibitions import Leases
+from engage_hri.services.generation.policies import Policies
 from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports
 from engage_hri.services.reports.in_force import Publisher, WorldReport
 from engage_hri.services.reports.ongoing_actions import GoesOn, TimedReport
@@ -73,7 +80,7 @@ def reads(message: object) -> TypeGuard[Told]:
 class GenerationIntake:
     """All of generation but its requests' lives.
 
-    session: part of the ids of what it sends, of this life alone. policies: of the head, of installed packages.
+    session: part of the ids of what it sends, of this life alone. policies: of installed packages.
     """
 
     def __init__(
@@ -82,7 +89,7 @@ class GenerationIntake:
         config: GenerationConfig,
         clock: MachineClocks,
         session: str,
-        policies: Mapping[str, type[HeadPolicy]] = {},
+        policies: Policies = Policies(),  # noqa: B008
     ) -> None:
         self._robot = robot
         self._clock = clock
@@ -91,12 +98,20 @@ class GenerationIntake:
         self._outputs: list[Struct] = []
         self._own_sight = OwnSight()
         self._sight = Sight(NAME, lambda: self._own_sight.unlinked_at)
-        self._arbiter = Arbiter(robot, config, policies)
+        self._arbiter = Arbiter(robot, config, policies.head)
         self._shifts: dict[str, str] = {}
         """Gaze shifts of the arbiter under way, by the id of their request."""
         self._leases = Leases(config)
         self._fragments = Fragments(
-            robot, config, clock, session, self._sight, self._arbiter, self._leases, self._outputs.append
+            robot,
+            config,
+            clock,
+            session,
+            self._sight,
+            self._arbiter,
+            self._leases,
+            self._outputs.append,
+            policies.turns,
         )
         self._objects = CoveredObjects(COVERED_FOR)
         self._own_words = OwnWords()
@@ -366,13 +381,17 @@ class GenerationIntake:
         """Decide on the head."""
         self._arbiter.inhibit(self._leases.inhibition)
         ruling = self._arbiter.rule(now)
-        while self._arbiter.mistakes:
-            name, error = self._arbiter.mistakes.pop(0)
-            self._outputs.append(TellMistake(error, f"the head's policy {name!r}, which is followed no longer"))
+        for followed in (self._arbiter.policies, self._fragments.policies):
+            while followed.mistakes:
+                name, error = followed.mistakes.pop(0)
+                self._outputs.append(TellMistake(error, f"policy {name!r}, which is followed no longer"))
         if ruling.changed:
             since = Stamp(self._clock.name, ruling.since)
             self._publish(keys.HEAD_OWNER, HeadOwner(owner=ruling.owner, since=since, waiting=ruling.waiting))
         if ruling.shift is not None:
+            why = Fault(reason="the head is to go elsewhere", cause="cancelled", whose=NAME)
+            # A shift waits for the one before it: the eyes would come to where they are not to be, and leave at once.
+            self._outputs += [CancelRequest(id, why) for id in self._shifts]
             self._shifts[self._send(ruling.shift)] = ruling.shift.id
         if ruling.nod is not None:
             self._send(ruling.nod)

@@ -38,7 +38,7 @@ from engage_hri.services.generation.inhibitions import Permits
 from engage_hri.services.generation.references.policy import Unreferable
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.outcomes import TurnEvents
-from engage_hri.services.generation.turns.policy import TurnPlan
+from engage_hri.services.generation.turns.plan import TurnPlan
 from engage_hri.services.reports.same_people import renamed
 from engage_hri.services.text.ear import is_spoken
 

@@ -35,7 +35,7 @@ from engage_hri.services.generation.references.phrases import NO_DISCOURSE, Disc
 from engage_hri.services.generation.references.policy import Choices, choice, weigh
 from engage_hri.services.generation.references.sequence import references_apart, unasked
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
-from engage_hri.services.generation.turns.policy import TurnPlan, in_vain
+from engage_hri.services.generation.turns.plan import TurnPlan, in_vain
 from engage_hri.services.runtime.steps import SLICE
 
 WORDS_BETWEEN = 3.0

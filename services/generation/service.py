@@ -11,7 +11,7 @@ from msgspec import Struct
 from engage_hri.schemas import keys
 from engage_hri.schemas.blocks import PerformBlock
 from engage_hri.schemas.body import DescribeBody
-from engage_hri.schemas.faults import EngageError, Fault, InputRefused, RunFailed
+from engage_hri.schemas.faults import EngageError, RunFailed
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import session_of
 from engage_hri.schemas.requests import Cancel
@@ -30,10 +30,9 @@ from engage_hri.services.generation.exchange import (
     Question,
     SendRequest,
 )
-from engage_hri.services.generation.head.policies import WHERE, Policies
 from engage_hri.services.generation.intake import GenerationIntake, reads
+from engage_hri.services.generation.policies import installed
 from engage_hri.services.requests.ends import News, RequestDesk, Requester
-from engage_hri.services.runtime.installation import HEAD_POLICIES, offers
 from engage_hri.services.runtime.intake import AnswerRequest, Input, PublishMessage, TellMistake, input_of
 from engage_hri.services.runtime.ledger import BusClock, NotedIntake
 from engage_hri.services.runtime.loop import Alarm
@@ -69,20 +68,6 @@ async def generate(bus: Bus, ready: Ready, config: GenerationConfig, *, covered_
                 generation.close()
 
 
-def installed_policies(config: GenerationConfig) -> Policies:
-    """Import the policies of the head that installed packages offer, but those that are off. Raises InputRefused."""
-    policies = {}
-    for offer in offers(HEAD_POLICIES):
-        if offer.name not in config.policies_off:
-            try:
-                policies[offer.name] = offer.load()
-            except Exception as error:
-                what = f"policy {offer.name!r} of {offer.package} cannot be imported: {error}"
-                advice = offer.advice(error) or f"{WHERE} = [{offer.name!r}] goes without it"
-                raise InputRefused(Fault(reason=what, where=WHERE, advice=advice)) from error
-    return policies
-
-
 class _Generation:
     """The parts of the service: both ends of requests, and generation with its ledger."""
 
@@ -92,7 +77,7 @@ class _Generation:
         self._desk = RequestDesk(bus, NAME, self._cancel)
         self._requests = Requester(bus)
         clock = BusClock(bus)
-        self._intake = GenerationIntake(bus.robot, config, clock, session_of(bus.run), installed_policies(config))
+        self._intake = GenerationIntake(bus.robot, config, clock, session_of(bus.run), installed(config))
         self._steps = NotedIntake(bus, NAME, self._intake, clock, self._carry_out)
         self._alarm = Alarm(partial(self._do, self._steps.advance))
         self._due: deque[Callable[[], None]] = deque()

@@ -79,10 +79,12 @@ if TYPE_CHECKING:
     from importlib.metadata import Distribution, EntryPoint
 
 GROUPS = (
-    BODIES, VOICES, SERVICES, RECOGNIZERS, TURN_DETECTORS, LANDMARKS, PIECES, TABLES, HEAD_POLICIES, TURN_ENDS,
+    BODIES, VOICES, SERVICES, RECOGNIZERS, TURN_DETECTORS, LANDMARKS, PIECES, TABLES, HEAD_POLICIES, TURN_POLICIES,
+    TURN_ENDS,
 ) = (
     "engage.bodies", "engage.voices", "engage.services", "engage.recognizers", "engage.turn_detectors",
-    "engage.landmarks", "engage.pieces", "engage.tables", "engage.head_policies", "engage.turn_ends",
+    "engage.landmarks", "engage.pieces", "engage.tables", "engage.head_policies", "engage.turn_policies",
+    "engage.turn_ends",
 )  # fmt: skip
 
 

@@ -80,7 +80,7 @@ def test_in_json_the_path_says_where() -> None:
 
 @pytest.mark.parametrize("more", [{"turn_index": 2}, {"turn_status": "middle"}, {"turn_status": "backchannel"}])
 def test_time_for_an_answer_that_nobody_waits_for_is_warned_of(more: dict[str, Any]) -> None:
-    from engage_hri.services.generation.turns.policy import in_vain, plan_turn
+    from engage_hri.services.generation.turns.plan import in_vain, plan_turn
 
     def told(fragment: TurnFragment) -> list[str]:
         return [text.partition(":")[0] for text in in_vain(fragment, plan_turn(fragment, fragment.id, "ann"))]

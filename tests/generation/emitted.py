@@ -18,7 +18,7 @@ from engage_hri.services.generation.block.emission import Emission, FragmentPlan
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.inhibitions import Permits
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
-from engage_hri.services.generation.turns.policy import plan_turn
+from engage_hri.services.generation.turns.plan import plan_turn
 
 POINT: GestureChoice = "directed_gaze_with_pointing"
 LOOK: GestureChoice = "directed_gaze"

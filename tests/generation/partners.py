@@ -125,6 +125,8 @@ class Partners:
         self.warnings: list[WarningFeedback] = []
         self.refusal: Fault | None = None
         """How the realizer answers blocks; None: it takes them."""
+        self.shifts_arrive = True
+        """False: gaze shifts stay on their way."""
         self.told = asyncio.Event()
 
     async def listen(self) -> None:
@@ -138,7 +140,7 @@ class Partners:
                     case PerformBlock() as request:
                         self.blocks.append(request)
                         self.desk.accept(request.id)
-                        if all(isinstance(each, GazeShift) for each in request.block.behaviors[:1]):
+                        if self.shifts_arrive and isinstance(request.block.behaviors[0], GazeShift):
                             self.end(request)
                     case Cancel(id=id):
                         self.cancelled.append(id)

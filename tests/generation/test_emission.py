@@ -16,6 +16,7 @@ from engage_hri.schemas.behaviors import (
     Timing,
 )
 from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.services.generation.turns.continuation import Continuation
 from tests.generation.emitted import LOOK, POINT, Made, block, by_id, lines, reference, speech
 
 # -- profile check-back -----------------------------------------------------------------------------------------
@@ -327,3 +328,31 @@ def test_a_speech_that_its_author_has_timed_is_left_alone() -> None:
     fragment = TurnFragment(id="f", behaviors=(speech("s1"), timed))
 
     assert not [line for line in lines(block(fragment)) if line.startswith("s2:start")]
+
+
+EYES_ON_ANN = Continuation(seen_after=0.2, eyes_on="ann")
+
+
+@pytest.mark.parametrize(
+    ("look", "waits"),
+    [
+        (Gaze(id="look", target="piece"), ["look:start after bml:start+0.2"]),
+        (Gaze(id="look", target="ann"), []),
+        (Gaze(id="look", target="piece", timing=(Timing("start", "0.1"),)), []),
+    ],
+)
+def test_the_first_look_waits_until_what_the_eyes_have_just_come_to_was_seen(look: Gaze, waits: list[str]) -> None:
+    fragment = TurnFragment(id="f", turn_status="full", behaviors=(look, speech("s")))
+
+    assert lines(block(fragment, before=EYES_ON_ANN), "eyes-rest") == waits
+
+
+def test_the_look_of_a_reference_and_that_of_the_turn_wait_too() -> None:
+    refers = TurnFragment(id="f", turn_status="full", behaviors=(reference("ref"),))
+    says = TurnFragment(id="f", turn_status="full", behaviors=(speech("s"),))
+
+    assert lines(block(refers, [(LOOK, "it")], before=EYES_ON_ANN), "eyes-rest") == [
+        "ref-gaze:start after bml:start+0.2"
+    ]
+    assert lines(block(says, before=EYES_ON_ANN), "eyes-rest") == ["turn-gaze:start after bml:start+0.2"]
+    assert lines(block(says, before=Continuation(eyes_on="ann")), "eyes-rest") == []

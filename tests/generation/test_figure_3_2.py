@@ -10,7 +10,7 @@ from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.fragment_check import checked
 from engage_hri.services.generation.inhibitions import Permits
 from engage_hri.services.generation.pipeline import targets
-from engage_hri.services.generation.turns.policy import plan_turn
+from engage_hri.services.generation.turns.plan import plan_turn
 from tests.generation.emitted import POINT, by_id, lines
 from tests.generation.tables import TANGRAMS, body, flat_world, plan, scene
 

@@ -14,11 +14,13 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.followed import arranged
 from engage_hri.services.generation.head.arbiter import Arbiter
 from engage_hri.services.generation.head.maintenance_policy import FaceWatch
-from engage_hri.services.generation.head.policies import ORDERS, OWN, arranged
+from engage_hri.services.generation.head.policies import ORDERS, OWN
 from engage_hri.services.generation.head.policy import HeadPolicy
 from engage_hri.services.generation.head.scene import Observation
+from engage_hri.services.generation.policies import installed
 from tests.control.test_offers import install as install
 from tests.generation.heads import INHIBITED, Stage, on_the_face, world
 from tests.generation.partners import stage
@@ -73,18 +75,20 @@ def staged(**policies: type[HeadPolicy]) -> Stage:
 def test_priorities_are_counted_from_the_order_one_for_each_kind() -> None:
     alone = Arbiter("robot", GenerationConfig())
 
-    priorities = {policy.name: policy.priority for policy in alone._policies}
+    priorities = {policy.name: policy.priority for policy in alone.policies}
     assert sorted(SIX, key=lambda name: priorities[name]) == [*SIX]
     assert priorities["listening"] == priorities["response"]
-    assert {*priorities.values()} == {*range(1, len({policy.kind for policy in alone._policies}) + 1)}
+    assert {*priorities.values()} == {*range(1, len({policy.kind for policy in alone.policies}) + 1)}
 
 
 def test_a_policy_of_others_gets_the_head_in_its_place_and_only_then() -> None:
     with_piece = staged(piece=Piece)
     with_piece.until(22.0)
     assert with_piece.owners[-1] == (20.0, "piece", "piece")
-    assert with_piece.rulings[-1].owner.priority == 3
-    assert [claim.priority for claim in with_piece.rulings[-1].waiting if claim.kind == "face"] == [7]
+    places = {policy.kind: policy.priority for policy in staged().arbiter.policies}
+    assert with_piece.rulings[-1].owner.priority == places["glance"]
+    waiting = [claim.priority for claim in with_piece.rulings[-1].waiting if claim.kind == "face"]
+    assert waiting == [places["face"] + 1]
 
     with_piece.do(lambda arbiter: arbiter.fragment_gazes("other"))
     assert with_piece.owner == "fragment"
@@ -105,7 +109,9 @@ def test_one_that_raises_is_dropped_and_noted_and_the_head_goes_on() -> None:
     breaking = staged(breaks=Breaks, piece=Piece)
     breaking.feed(world(), world())
 
-    assert [(name, str(error)) for name, error in breaking.arbiter.mistakes] == [("breaks", "a second message")]
+    assert [(name, str(error)) for name, error in breaking.arbiter.policies.mistakes] == [
+        ("breaks", "a second message")
+    ]
     breaking.until(21.0)
     assert breaking.owner == "piece"
 
@@ -121,7 +127,7 @@ def test_a_mistake_of_ours_is_raised(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("off", [name for name in OWN if name not in ORDERS])
 def test_each_can_be_off(off: str) -> None:
-    assert [*arranged(GenerationConfig(policies_off=(off,)), {})] == [name for name in OWN if name != off]
+    assert [*arranged(OWN, {}, (off,))] == [name for name in OWN if name != off]
 
 
 def test_without_glances_nothing_disturbs_the_hands() -> None:
@@ -135,19 +141,18 @@ def test_without_glances_nothing_disturbs_the_hands() -> None:
     assert seen == [True, False]
 
 
-@pytest.mark.parametrize(
-    ("off", "others", "told"),
-    [
-        (("glanse",), {}, "no policy 'glanse'"),
-        (("fragment",), {}, "somebody has ordered"),
-        ((), {"late": type("Late", (HeadPolicy,), {"before": "hamds"})}, "is to come before 'hamds'"),
-    ],
-)
-def test_what_cannot_be_arranged_is_refused(
-    off: tuple[str, ...], others: dict[str, type[HeadPolicy]], told: str
-) -> None:
+@pytest.mark.parametrize(("off", "told"), [("glanse", "no policy 'glanse'"), ("fragment", "somebody has ordered")])
+def test_what_there_is_not_and_what_is_ordered_cannot_be_off(off: str, told: str) -> None:
     with pytest.raises(InputRefused, match=told):
-        arranged(GenerationConfig(policies_off=off), others)
+        installed(GenerationConfig(policies_off=("aversion", off, "silence")))
+
+
+def test_a_place_before_one_that_there_is_not_is_refused() -> None:
+    late = type("Late", (HeadPolicy,), {"before": "hamds"})
+    with pytest.raises(InputRefused, match="is to come before 'hamds'") as refused:
+        arranged(OWN, {"late": late})
+
+    assert "hands" in refused.value.fault.advice
 
 
 def test_an_inhibition_is_above_a_policy_of_others() -> None:
@@ -160,7 +165,7 @@ def test_an_inhibition_is_above_a_policy_of_others() -> None:
 
 def test_the_policy_of_the_page_is_one() -> None:
     page = (Path(__file__).resolve().parents[2] / "docs" / "generation.md").read_text(encoding="utf-8")
-    [code] = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    code, _ = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     names: dict[str, type] = {}
     exec(code, names)
     looks = staged(door=names["Door"])

@@ -15,9 +15,10 @@ from engage_hri.schemas.summary import Summary, summary
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.generation.turns.interjections import UNDECIDED, WORDLESS
-from engage_hri.services.generation.turns.policy import TurnPolicy
+from engage_hri.services.generation.turns.robot_turns import RobotTurns
 from tests.generation.test_talked_into import LONG, call, robot
 from tests.generation.test_turn_policy import fragment
+from tests.generation.turns import robot_turns
 from tests.random_cases import share_of
 
 PEOPLE = ("ann", "bob", "cy")
@@ -29,8 +30,8 @@ def news(who: str, reading: InterjectionReading, since: float, words: str = "") 
     return Interjection(actor=who, since=at, at=at, reading=reading, words=words)
 
 
-def speaking(**fields: object) -> TurnPolicy:
-    turns = TurnPolicy()
+def speaking(**fields: object) -> RobotTurns:
+    turns = robot_turns()
     turns.accept(fragment("a", "full", **fields), ("ann", "bob"))
     turns.fragment_begins("a")
     return turns
@@ -95,7 +96,7 @@ def test_a_speech_breaks_the_turn_off_only_if_it_may_and_lasts(seed: int) -> Non
         if what == 0:
             turns.interjections.falls_silent(said.who)
         elif what < 3:
-            turns.interject(news(said.who, "open" if what == 1 else reading, said.since, said.words), at)
+            turns.feed(news(said.who, "open" if what == 1 else reading, said.since, said.words), at)
         elif ended is None:
             if turns.tick(at) is not None:
                 ended = at
@@ -118,7 +119,7 @@ def test_seconds_are_not_negative() -> None:
 
 
 def test_a_beginning_says_it_for_its_turn_and_each_fragment_may_say_otherwise() -> None:
-    turns = TurnPolicy()
+    turns = robot_turns()
     turns.accept(fragment("a", "beginning", interruptible=False, interruptible_after=1.0), ("ann", "bob"))
     inherits = turns.accept(fragment("b", "middle"), "")
     own = turns.accept(fragment("c", "end", interruptible="bob", interruptible_after=0.0), "")
@@ -128,14 +129,14 @@ def test_a_beginning_says_it_for_its_turn_and_each_fragment_may_say_otherwise() 
 
 
 def test_it_holds_in_the_pauses_of_an_open_turn() -> None:
-    turns = TurnPolicy()
+    turns = robot_turns()
     turns.accept(fragment("a", "beginning", interruptible=False), "ann")
     turns.fragment_begins("a")
     turns.accept(fragment("b", "middle", interruptible=True), "")
     for id, at in (("a", 1.0), ("b", 2.0)):
         turns.fragment_ended(id, complete=True, now=at)
-    turns.interject(news("ann", "open", 3.0), 3.0)
-    turns.interject(news("ann", "interruption", 3.0), 3.5)
+    turns.feed(news("ann", "open", 3.0), 3.0)
+    turns.feed(news("ann", "interruption", 3.0), 3.5)
 
     assert turns.tick(3.5) is None
     assert turns.open_turn == "a"

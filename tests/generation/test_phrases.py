@@ -14,7 +14,7 @@ from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.inhibitions import Permits
 from engage_hri.services.generation.references import phrases
 from engage_hri.services.generation.references.phrases import Proposals, proposed
-from engage_hri.services.generation.turns.policy import plan_turn
+from engage_hri.services.generation.turns.plan import plan_turn
 from engage_hri.services.tangram.table import tangram_table
 from tests.generation.tables import HEIGHT, body, plan
 

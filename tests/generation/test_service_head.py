@@ -48,6 +48,18 @@ async def test_the_robot_looks_at_the_face_from_the_beginning(hub: MemoryHub) ->
         assert owners(partners) == [(0.0, "face", "human")]
 
 
+async def test_a_shift_takes_the_head_from_one_that_is_on_its_way(hub: MemoryHub) -> None:
+    async with stage(hub) as partners:
+        await asyncio.sleep(1.0)
+        partners.shifts_arrive = False
+        for target in ("left", "right"):
+            partners.event(target, "started", initiator="human", responder="robot", objects=(target,))
+            await asyncio.sleep(0.5)
+
+        assert [target for _, target in partners.shifts] == ["human", "left", "right"]
+        assert partners.cancelled == [partners.request("response-2").id]
+
+
 async def test_a_fragments_gaze_owns_the_head_from_its_start_to_its_end(hub: MemoryHub) -> None:
     async with stage(hub) as partners:
         partners.send(looks())

@@ -20,11 +20,11 @@ from engage_hri.services.commandline.embedding import services
 from engage_hri.services.commandline.shell import roster
 from engage_hri.services.commandline.shell.config import load
 from engage_hri.services.generation.fragment_check import checked, performable
-from engage_hri.services.generation.turns.policy import TurnPolicy
 from engage_hri.services.runtime.service import running
 from tests.generation.emitted import POINT, block, by_id, emission, lines, reference
 from tests.generation.test_talked_into import call, robot
 from tests.generation.test_turn_policy import fragment
+from tests.generation.turns import robot_turns, seen
 from tests.random_cases import share_of
 
 PEOPLE = ("ann", "bob", "cy", "dan")
@@ -83,7 +83,7 @@ def test_documents_say_it(encode: object, named: str | tuple[str, ...], interrup
 
 
 def test_the_rest_of_a_turn_is_for_the_same_people() -> None:
-    turns = TurnPolicy()
+    turns = robot_turns()
     turns.accept(fragment("a", "beginning"), ("ann", "bob"))
 
     assert turns.accept(fragment("b", "middle"), "").addressees == ("ann", "bob")
@@ -93,13 +93,13 @@ def test_the_rest_of_a_turn_is_for_the_same_people() -> None:
 
 
 def test_a_turn_ends_when_all_have_left() -> None:
-    turns = TurnPolicy()
+    turns = robot_turns()
     turns.accept(fragment("a", "full"), ("ann", "bob"))
     turns.fragment_begins("a")
-    turns.see(["bob"], 1.0)
+    turns.feed(seen("bob"), 1.0)
 
     assert turns.tick(60.0) is None
-    turns.see([], 60.0)
+    turns.feed(seen(), 60.0)
     assert turns.tick(60.0) is None
     aborted = turns.tick(turns.deadline or 0.0)
     assert aborted is not None

@@ -12,23 +12,24 @@ from engage_hri.schemas.recognition import session_of
 from engage_hri.services.bus.deadlines import LATE, Sight
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.turns import policy
-from engage_hri.services.generation.turns.policy import TurnPolicy
+from engage_hri.services.generation.turns import endings
+from engage_hri.services.generation.turns.robot_turns import RobotTurns
 from engage_hri.services.requests.ends import RequestRefused
 from engage_hri.services.requests.serving import GRACE
 from tests.generation.partners import TABLE, stage
 from tests.generation.test_service import refers, says
 from tests.generation.test_turn_endings import into
 from tests.generation.test_turn_policy import fragment
+from tests.generation.turns import robot_turns, seen
 from tests.standing_still import stand_still
 
 CONFIG = GenerationConfig(decision_patience=3.0)
 SOON, TOO_LATE = 0.5 * LATE, 2.0 * LATE
 
 
-def silent(sight: Sight) -> TurnPolicy:
+def silent(sight: Sight) -> RobotTurns:
     """An open turn whose speaker has said nothing since 3.0; it has ten seconds, until 13.0."""
-    turns = TurnPolicy(sight)
+    turns = robot_turns(sight)
     turns.accept(fragment("a", "beginning"), "human", "manager", "1")
     turns.fragment_ended("a", complete=True, now=3.0)
     assert turns.tick(3.0) is None
@@ -78,27 +79,27 @@ def test_a_silence_is_a_speakers_unless_generation_stood_still_or_had_no_router(
 
 @pytest.mark.parametrize("is_back", [True, False])
 def test_a_person_who_came_back_while_generation_stood_still_has_not_left(is_back: bool) -> None:
-    turns = TurnPolicy()
+    turns = robot_turns()
     turns.accept(fragment("a", "beginning"), "human", "manager", "1")
-    turns.see([], 1.0)
+    turns.feed(seen(), 1.0)
     assert turns.tick(1.0) is None
     assert turns.tick(4.5) is None
     if is_back:
-        turns.see(["human"], 4.51)
+        turns.feed(seen("human"), 4.51)
 
     assert (turns.tick(4.5 + LATE) is None) == is_back
 
 
 @pytest.mark.parametrize("has_ended", [True, False])
 def test_a_person_who_fell_silent_while_generation_stood_still_has_not_taken_the_floor(has_ended: bool) -> None:
-    turns = TurnPolicy(barge_in=0.8)
+    turns = robot_turns(barge_in=0.8)
     turns.accept(fragment("a", "full"), "human", "manager", "1")
     turns.fragment_begins("a")
-    turns.interject(into("open"), 2.0)
+    turns.feed(into("open"), 2.0)
     assert turns.tick(2.0) is None
     assert turns.tick(5.0) is None
     if has_ended:
-        turns.interject(into("backchannel"), 5.01)
+        turns.feed(into("backchannel"), 5.01)
 
     assert (turns.tick(5.0 + LATE) is None) == has_ended
 
@@ -202,7 +203,7 @@ async def test_a_rest_that_is_refused_since_the_body_is_gone_ends_its_turn_and_i
 async def test_a_rest_that_waits_in_vain_for_the_world_ends_its_turn(
     hub: MemoryHub, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(policy, "TURN_SILENCE", 100.0)
+    monkeypatch.setattr(endings, "TURN_SILENCE", 100.0)
     async with stage(hub) as partners:
         first = partners.send(says("a", "beginning"))
         await partners.fragment_block("a")

@@ -5,8 +5,9 @@ import pytest
 from engage_hri.schemas.fragments import TurnStatus
 from engage_hri.schemas.recognition import Interjection, InterjectionReading
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.generation.turns.policy import Aborted, TurnPolicy
+from engage_hri.services.generation.turns.robot_turns import Aborted, RobotTurns
 from tests.generation.test_turn_policy import fragment, policy
+from tests.generation.turns import robot_turns
 
 
 def told(aborted: Aborted | None) -> tuple[str, str, tuple[str, ...], str]:
@@ -97,9 +98,9 @@ def into(reading: InterjectionReading, actor: str = "human", since: float = 2.0)
     return Interjection(actor=actor, since=stamp, at=stamp, reading=reading, words="so it is")
 
 
-def speaking(barge_in: float | None = None) -> TurnPolicy:
+def speaking(barge_in: float | None = None) -> RobotTurns:
     """The robot says a sentence of two."""
-    turns = TurnPolicy(barge_in=barge_in)
+    turns = robot_turns(barge_in=barge_in)
     turns.accept(fragment("a", "beginning"), "human")
     turns.fragment_begins("a")
     turns.accept(fragment("b", "end"), "")
@@ -108,9 +109,9 @@ def speaking(barge_in: float | None = None) -> TurnPolicy:
 
 def test_what_is_undecided_holds_the_turn_and_an_interruption_ends_it() -> None:
     turns = speaking()
-    turns.interject(into("open"), 2.0)
+    turns.feed(into("open"), 2.0)
     before = turns.held
-    turns.interject(into("interruption"), 2.6)
+    turns.feed(into("interruption"), 2.6)
 
     assert before == "a"
     assert told(turns.tick(2.6)) == ("a", "human", ("a", "b"), "human took the floor")
@@ -122,8 +123,8 @@ def test_what_is_undecided_holds_the_turn_and_an_interruption_ends_it() -> None:
 @pytest.mark.parametrize("reading", ["backchannel", "noise", "other", "answer"])
 def test_after_anything_else_the_turn_goes_on(reading: InterjectionReading) -> None:
     turns = speaking()
-    turns.interject(into("open"), 2.0)
-    turns.interject(into(reading), 2.5)
+    turns.feed(into("open"), 2.0)
+    turns.feed(into(reading), 2.5)
 
     assert (turns.held, turns.tick(2.5), turns.deadline) == ("", None, None)
     (kept,) = turns.interjections.of_turn("a")
@@ -132,30 +133,30 @@ def test_after_anything_else_the_turn_goes_on(reading: InterjectionReading) -> N
 
 def test_what_nobody_decides_holds_the_turn_for_three_seconds() -> None:
     turns = speaking()
-    turns.interject(into("open"), 2.0)
+    turns.feed(into("open"), 2.0)
 
     assert turns.deadline == 5.0
     assert (turns.tick(4.99), turns.held) == (None, "a")
     assert (turns.tick(5.0), turns.held) == (None, "")
-    turns.interject(into("interruption"), 6.0)
+    turns.feed(into("interruption"), 6.0)
     assert turns.tick(6.0) is not None, "better late than never"
 
 
 def test_of_two_who_speak_both_have_to_be_decided() -> None:
     turns = speaking()
-    turns.interject(into("open"), 2.0)
-    turns.interject(into("open", since=2.5), 2.5)
-    turns.interject(into("noise"), 2.5)
+    turns.feed(into("open"), 2.0)
+    turns.feed(into("open", since=2.5), 2.5)
+    turns.feed(into("noise"), 2.5)
     before = turns.held
-    turns.interject(into("backchannel", since=2.5), 3.0)
+    turns.feed(into("backchannel", since=2.5), 3.0)
 
     assert (before, turns.held) == ("a", "")
 
 
 def test_what_somebody_else_says_neither_holds_nor_ends_the_turn() -> None:
     turns = speaking()
-    turns.interject(into("open", "passer-by"), 2.0)
-    turns.interject(into("interruption", "passer-by"), 2.8)
+    turns.feed(into("open", "passer-by"), 2.0)
+    turns.feed(into("interruption", "passer-by"), 2.8)
 
     assert (turns.held, turns.tick(3.0)) == ("", None)
     [into_it] = turns.interjections.of_turn("a")
@@ -166,12 +167,12 @@ def test_what_was_said_into_one_turn_does_not_cut_the_next() -> None:
     turns = policy()
     turns.accept(fragment("a", "full"), "human")
     turns.fragment_begins("a")
-    turns.interject(into("open"), 2.0)
+    turns.feed(into("open"), 2.0)
     turns.turn_ended("a", 2.1)
     turns.accept(fragment("b", "full"), "human")
     turns.fragment_ended("a", complete=True, now=2.2)
     turns.fragment_begins("b")
-    turns.interject(into("interruption"), 2.8)
+    turns.feed(into("interruption"), 2.8)
 
     assert (turns.held, turns.tick(3.0)) == ("", None)
 
@@ -182,7 +183,7 @@ def test_nobody_talks_into_a_backchannel_or_a_turn_that_has_not_begun(status: Tu
     turns.accept(fragment("a", status), "human")
     if status == "backchannel":
         turns.fragment_begins("a")
-    turns.interject(into("open"), 1.1)
+    turns.feed(into("open"), 1.1)
 
     assert (turns.held, turns.tick(9.0)) == ("", None)
 
@@ -190,7 +191,7 @@ def test_nobody_talks_into_a_backchannel_or_a_turn_that_has_not_begun(status: Tu
 @pytest.mark.parametrize("ends", [True, False])
 def test_a_voice_takes_the_floor_by_its_length_only_if_that_is_set(*, ends: bool) -> None:
     turns = speaking(barge_in=0.5)
-    turns.interject(into("open"), 2.0)
+    turns.feed(into("open"), 2.0)
     if ends:
         turns.interjections.falls_silent("human")
 

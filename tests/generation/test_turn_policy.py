@@ -6,7 +6,9 @@ import pytest
 
 from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
-from engage_hri.services.generation.turns.policy import Aborted, TurnPlan, TurnPolicy, in_vain, plan_turn
+from engage_hri.services.generation.turns.plan import TurnPlan, in_vain, plan_turn
+from engage_hri.services.generation.turns.robot_turns import Aborted, RobotTurns
+from tests.generation.turns import robot_turns
 
 
 def told(aborted: Aborted | None) -> tuple[str, str, tuple[str, ...], str]:
@@ -19,8 +21,8 @@ def fragment(id: str, status: TurnStatus, index: int = 1, **fields: object) -> T
     return TurnFragment(id=id, turn_index=index, turn_status=status, **fields)  # type: ignore[arg-type]
 
 
-def policy() -> TurnPolicy:
-    return TurnPolicy()
+def policy() -> RobotTurns:
+    return robot_turns()
 
 
 @pytest.mark.parametrize(

@@ -87,7 +87,8 @@ class HeadFindings(NamedTuple):
     heard_on_face: float
     """Seconds of these in which the eyes rested on who spoke."""
     aways: tuple[float, ...]
-    """Lengths of looks away from a face, until the next look at a face."""
+    """Lengths of looks away from a face, until the next look at a face. A turn from one face to another, without a
+    look at anything between, is none: a head takes half a second for it."""
     mutual: int
     """Times that eyes met."""
     broken_by_hands: int
@@ -137,9 +138,13 @@ def findings(messages: list[Message], robot: str = "robot") -> HeadFindings:
     soon = [_is_on(looks, at, to or people, 0.5) for at, to in ends]
     at_faces = [each for each in looks if each.what in people]
     heard = list(to_robot(messages, robot))
-    gaps = (later.began - one.ended for one, later in pairwise(at_faces))
-    mutual = list(_mutual(messages, looks, people, robot))
     following = dict(pairwise(looks))
+    gaps = (
+        later.began - one.ended
+        for one, later in pairwise(at_faces)
+        if later.what == one.what or following[one] != later
+    )
+    mutual = list(_mutual(messages, looks, people, robot))
     broken = [
         each for each, look in mutual
         if each.length < MUTUAL and each.ended == look.ended

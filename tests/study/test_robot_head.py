@@ -55,15 +55,16 @@ def test_the_time_on_who_speaks_is_that_within_the_speech() -> None:
     assert (seen.heard, seen.heard_on_face) == (4.0, 2.0)
 
 
-def test_looks_away_are_from_a_face_until_a_face() -> None:
+def test_looks_away_are_from_a_face_until_a_face_and_not_the_way_to_another_one() -> None:
     seen = found(
-        told("robot", "look", "ann", 0, 10, 10.8, 20),
-        told("robot", "look", "ben", 20.3, 30, 34, 60),
+        told("robot", "look", "ann", 0, 10, 10.8, 20, 40, 45),
+        told("robot", "look", "ben", 20.6, 30, 34, 38, 48, 60),
+        told("robot", "look", "table", 38.5, 39.5),
         people=(ANN, BEN),
     )
 
-    assert [round(each, 3) for each in seen.aways] == [0.8, 0.3, 4.0]
-    assert seen.aways_a_minute == 1.0
+    assert [round(each, 3) for each in seen.aways] == [0.8, 4.0, 2.0]
+    assert seen.aways_a_minute == 2.0
 
 
 @pytest.mark.parametrize(("hers", "then", "broken"), [(1.5, "ann-hand", 1), (1.5, "table", 0), (1.0, "ann-hand", 0)])

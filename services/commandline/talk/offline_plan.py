@@ -38,15 +38,16 @@ async def _generated(things: Sequence[Thing], world: World, config: RobotConfig,
     from engage_hri.services.generation.fragment_check import performable
     from engage_hri.services.generation.inhibitions import Leases
     from engage_hri.services.generation.pipeline import glance, planned, planning, targets
+    from engage_hri.services.generation.policies import installed
     from engage_hri.services.generation.references.motions import distinct, from_here, from_here_told
     from engage_hri.services.generation.references.phrases import NO_DISCOURSE
     from engage_hri.services.generation.references.policy import Unreferable
-    from engage_hri.services.generation.turns.policy import TurnPolicy
+    from engage_hri.services.generation.turns.robot_turns import RobotTurns
 
     body = made(config.control)
     calibration = calibrated(body, config.control.calibration)
     permits = Leases(config.generation).permits()
-    turns = TurnPolicy()
+    turns = RobotTurns(config.robot, config.generation, installed(config.generation).turns)
 
     def estimated(items: Sequence[EstimateItem]) -> Sequence[Estimate]:
         return [calibration.stated(estimate) for estimate in body.rehearse(items, world)]

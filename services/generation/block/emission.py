@@ -58,7 +58,7 @@ from engage_hri.services.generation.block.rewriting import Operator, Rewriting, 
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.inhibitions import Permits
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation, Stroke, first_met, stroke
-from engage_hri.services.generation.turns.policy import TurnPlan
+from engage_hri.services.generation.turns.plan import TurnPlan
 
 _ALPHABETIC = r"""(?:['’](?:s|d|m|ll|re|ve)\b)?[.,;:!?…)\]"'”’»]*(?=\s|$)"""
 _IDEOGRAPHIC = "[、。，．；：！？…）］」』】》〉]+"
@@ -230,6 +230,7 @@ class Emission:
         self._time_speeches_and_references()
         opening, around = self._opening(), self._looks_around()
         behaviors = (*opening, *self._in_document_order(), *around, *self._closing())
+        self._let_the_eyes_rest(behaviors)
         if self.turn.closes and self.speeches:
             behaviors = lowered(behaviors, self.speeches[-1])
         return FragmentPlan(
@@ -247,6 +248,16 @@ class Emission:
             opening=tuple(each.id for each in opening),
             warnings=tuple(f"{behavior.id} is left out: inhibited" for behavior in self.dropped),
         )
+
+    def _let_the_eyes_rest(self, behaviors: Sequence[BlockBehavior]) -> None:
+        """Let the first look wait until what the eyes have just come to has been seen, unless its author times it."""
+        first = next((each for each in behaviors if isinstance(each, Gaze)), None)
+        if not self.before.seen_after or first is None or first.target == self.before.eyes_on:
+            return
+        source = next((id for id, parts in self.parts.items() if parts.gaze == first.id), first.id)
+        if not self.rewriting.is_timed(source, self.named):
+            rested = after(f"bml:start+{self.before.seen_after:g}", f"{first.id}:start")
+            self.constraints.append(Constraint(id=self.names.fresh("eyes-rest"), operators=(rested,)))
 
     def _speeches(self) -> list[str]:
         """Ids of plain speeches and phrases, in order."""

@@ -18,7 +18,7 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.block.rewriting import Operator, Point, Replacement
-from engage_hri.services.generation.turns.policy import TurnPlan
+from engage_hri.services.generation.turns.plan import TurnPlan
 
 LEAST_SEEN: Seconds = 0.3
 """Time for which the robot looks at least at what it refers to: below it nobody sees that it does."""

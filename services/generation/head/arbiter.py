@@ -2,15 +2,17 @@
 
 The claims are those of the policies, in the order of `policies.py`. A higher claim takes over at once; when the
 owner lets go the head stays for a dwell before a lower claim gets it. From a face that it has just gone to it goes
-to another one by a higher claim than those of the people (response, face) only. Policies move the base gaze by
-`gazeShift` blocks, which end on arrival and hold nothing. A fragment's own gaze lies over the base gaze: while it
-owns the head no shift is sent, with two exceptions. While that gaze is on a face the base gaze goes there, too,
-unseen: at the end of a turn the head must not fall back to where it was before. And when an inhibition that holds
-the head has that gaze aborted, the base gaze goes to its target: else the head would go home.
+to another one by a higher claim only: whoever answers is looked at at once, though the head has just gone on to
+another one of those who may answer, and of several who speak and look none draws it away from the other.
+
+Policies move the base gaze by `gazeShift` blocks, which end on arrival and hold nothing. A fragment's own gaze lies
+over the base gaze: while it owns the head no shift is sent, with two exceptions. While that gaze is on a face the
+base gaze goes there, too, unseen: at the end of a turn the head must not fall back to where it was before. And when
+an inhibition that holds the head has that gaze aborted, the base gaze goes to its target: else the head would go
+home.
 """
 
-from collections.abc import Callable, Mapping
-from typing import TypeVar
+from collections.abc import Mapping
 
 from msgspec import Struct
 
@@ -22,11 +24,13 @@ from engage_hri.schemas.units import Degrees, Probability, Radians, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import Acquaintances
 from engage_hri.services.generation.config import GenerationConfig
+from engage_hri.services.generation.followed import Followed, arranged
 from engage_hri.services.generation.head.orders import FragmentPolicy, InhibitionPolicy
-from engage_hri.services.generation.head.policies import OWN, arranged
+from engage_hri.services.generation.head.policies import OWN
 from engage_hri.services.generation.head.policy import HeadPolicy
 from engage_hri.services.generation.head.scene import NOBODY, HeadScene, Observation
 from engage_hri.services.generation.inhibitions import Inhibition
+from engage_hri.services.generation.turns.continuation import Continuation
 from engage_hri.services.reports.same_people import joined
 
 DWELL: Seconds = 0.3
@@ -39,7 +43,7 @@ takes the head elsewhere: below it nobody has seen anything, and people's eyes t
 ON_THE_WAY: Seconds = 2.0
 """Time after which a look counts as over of which nobody has told that it arrived: a body may be held up. Ours."""
 LEAST_LOOK: Seconds = 0.8
-"""Time for which a look at a face lasts at least before a claim from response down takes the head to another face: of
+"""Time for which a look at a face lasts at least before a claim that is no higher takes the head to another face: of
 several people who speak and look, the claims change faster than a head may. People's looks at who speaks last about a
 second. Ours."""
 RETRY: Seconds = 1.0
@@ -47,7 +51,6 @@ RETRY: Seconds = 1.0
 all the time. Ours."""
 NOD: Probability = 0.3
 """How large a nod is that says no more than that the robot listens: less than an answer's. Ours."""
-Answer = TypeVar("Answer")
 UP_RIGHT: Degrees = 60.0
 """Angle past the table: as far as the neck turns, at nothing that anybody could mean. Thesis 5.3."""
 
@@ -131,15 +134,14 @@ class Arbiter:
         self._orders = InhibitionPolicy(scene, config)
         self._fragments = FragmentPolicy(scene, config)
         ordered = {InhibitionPolicy: self._orders, FragmentPolicy: self._fragments}
-        self._policies: list[HeadPolicy] = []
-        self.mistakes: list[tuple[str, Exception]] = []
-        """Policies that have raised, and what, until somebody takes them."""
+        followed: list[HeadPolicy] = []
         kinds: dict[str, int] = {}
-        for name, each in arranged(config, policies).items():
+        for name, each in arranged(OWN, policies, config.policies_off).items():
             policy = ordered.get(each) or each(scene, config)
             policy.name, policy.kind = name, policy.kind or name
             policy.priority = kinds.setdefault(policy.kind, len(kinds) + 1)
-            self._policies.append(policy)
+            followed.append(policy)
+        self.policies = Followed(followed)
         self._people = Acquaintances()
         self._since: Seconds = 0.0
         self._waiting: tuple[Claim, ...] | None = None
@@ -172,7 +174,7 @@ class Arbiter:
             case Statistics(actor=actor) if actor:
                 self._people.hear(actor, now)
         self._scene.feed(observation, now)
-        self._ask(lambda policy: policy.feed(observation, now))
+        self.policies.ask(lambda policy: policy.feed(observation, now))
 
     def gaze_perceived_within(self, half_angle: Radians) -> None:
         """Take the half angle of the body's gaze cone; one in the configuration goes before."""
@@ -222,13 +224,14 @@ class Arbiter:
     def join(self, other: str, name: str) -> None:
         """Take two ids for one person, who is called `name` from now on. The next world has nobody called `other`."""
         self._scene.join(other, name)
-        self._ask(lambda policy: policy.join(other, name))
+        self.policies.ask(lambda policy: policy.join(other, name))
         self._scene.owner = joined(self._owner, other, name)
         self._base, self._held = joined(self._base, other, name), joined(self._held, other, name)
 
     def shift_arrived(self, id: str, now: Seconds) -> None:
         """Note that shift `id` is at its target: a body need not tell what its eyes rest on."""
-        if id.rpartition("-")[2] == str(self._shifts) and self._rests_since is None:
+        is_beneath = self._owner.kind == FragmentPolicy.kind
+        if id.rpartition("-")[2] == str(self._shifts) and self._rests_since is None and not is_beneath:
             self._rests_since = now
 
     def shift_failed(self, id: str, now: Seconds) -> None:
@@ -244,13 +247,13 @@ class Arbiter:
     def recognition_lost(self) -> None:
         """Drop what recognition told: the ends of its events and speeches will never come."""
         self._scene.recognition_lost()
-        self._ask(lambda policy: policy.recognition_lost())
+        self.policies.ask(lambda policy: policy.recognition_lost())
 
     # -- what follows ---------------------------------------------------------------------------------------------
 
     @property
     def deadline(self) -> Seconds | None:
-        due = self._ask(lambda policy: policy.deadline)
+        due = self.policies.ask(lambda policy: policy.deadline)
         due.append(self._failed[1] if self._failed else None)
         if self._stays_until is not None:
             due.append(self._stays_until)
@@ -280,7 +283,7 @@ class Arbiter:
                 self._since = now
         state = self._scene.state
         self._scene.head_on = owner.target or (state.looking_at if state else "") or self._base.target
-        self._ask(lambda policy: policy.has_head(owner.kind == policy.kind, now))
+        self.policies.ask(lambda policy: policy.has_head(owner.kind == policy.kind, now))
         self._waiting = tuple(claim for claim in claims if claim.kind != owner.kind)
         changed = owner != before or self._waiting != waited
         return Ruling(owner, self._since, self._waiting, changed, self._shift(now), self._nod(now))
@@ -293,7 +296,7 @@ class Arbiter:
 
     def _forget(self, person: str) -> None:
         self._scene.sight.forget(person)
-        self._ask(lambda policy: policy.forget(person))
+        self.policies.ask(lambda policy: policy.forget(person))
 
     def _claims(self, now: Seconds) -> list[Claim]:
         """Claims of the policies, the strongest first, one of each kind."""
@@ -304,21 +307,8 @@ class Arbiter:
             if claim is not None:
                 claims[:] = [claim, *(each for each in claims if each.kind != claim.kind)]
 
-        self._ask(ask)
+        self.policies.ask(ask)
         return claims
-
-    def _ask(self, question: Callable[[HeadPolicy], Answer]) -> list[Answer]:
-        """Ask all policies, the weakest first, or tell them. A mistake of ours is raised, one of others is noted."""
-        answers = []
-        for policy in self._policies[::-1]:
-            try:
-                answers.append(question(policy))
-            except Exception as error:
-                if type(policy) in OWN.values():
-                    raise
-                self._policies.remove(policy)
-                self.mistakes.append((policy.name, error))
-        return answers
 
     def _next_owner(self, claims: list[Claim], now: Seconds) -> Claim:
         """The claim that gets the head, or still the owner while its look is too short."""
@@ -336,9 +326,17 @@ class Arbiter:
         rests = self._rests_since
         ends = self._looks_since + ON_THE_WAY if rests is None else rests + LEAST_FIXATION
         faces = {self._owner.target, wanted.target}
-        if faces <= {*self._scene.sight.present(now)} and wanted.kind in ("response", "face"):
+        is_stronger = wanted.priority < self._owner.priority
+        if faces <= {*self._scene.sight.present(now)} and wanted.kind in ("response", "face") and not is_stronger:
             return max(ends, self._looks_since + LEAST_LOOK)
         return ends
+
+    def rest(self, now: Seconds) -> Continuation:
+        """The time until what the eyes rest on has been looked at for long enough; none if they are on their way."""
+        rests, on = self._rests_since, self._owner.target
+        return Continuation(
+            eyes_on=on, seen_after=max(rests + LEAST_FIXATION - now, 0.0) if rests is not None else 0.0
+        )
 
     def _strongest(self, claims: list[Claim], now: Seconds) -> Claim:
         best = claims[0] if claims else NOBODY
@@ -372,7 +370,7 @@ class Arbiter:
     def _nod(self, now: Seconds) -> Nod | None:
         if self._owner.kind in (InhibitionPolicy.kind, FragmentPolicy.kind):
             return None
-        for person in filter(None, self._ask(lambda policy: policy.nods(now))):
+        for person in filter(None, self.policies.ask(lambda policy: policy.nods(now))):
             self._nods += 1
             return Nod(f"nod-{self._nods}", person)
         return None

@@ -7,8 +7,8 @@ less than 2 to 3 s. Who begins a long utterance looks away, in 68 to 80 % of the
 
 The eyes leave only a face, and only where all weaker policies would stay on one: nothing is shown to the robot then,
 and no hand moves. So looks away cost no answer to what somebody directs to. While the robot waits for an answer, and
-while somebody has just met its eyes, it does not look away. The look away while a turn pauses for thought
-is a fragment's (`orders.py`).
+while somebody has just met its eyes, it does not look away, and it looks back when somebody begins to speak. The look
+away while a turn pauses for thought is a fragment's (`orders.py`).
 """
 
 from collections.abc import Sequence
@@ -58,6 +58,7 @@ class AversionPolicy(HeadPolicy):
             self._plans = self.scene.robot in begin and self.scene.words >= LONG_UTTERANCE
             if begin - {self.scene.robot}:
                 self._attends_until = now + ATTENDED
+                self._until = self._until and now
             self._speaking = speaking
 
     def recognition_lost(self) -> None:

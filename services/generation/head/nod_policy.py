@@ -4,7 +4,7 @@ Thesis 3.3.3 leaves a backchannel to the manager, for it may mean agreement. A c
 It says nothing of the content, so it needs no knowledge of it (thesis 6.2 asks for just that: backchannels that a
 pause of the speaker invites, off the manager's hands). Listeners give one each 6 s (143 in a quarter of an hour of a
 dialogue coded by hand), where the speaker pauses: that is a good single sign of the place (Cathcart, Carletta and
-Isard 2003), and soon after the beginning, or after the one before, none is given (Ward and Tsukahara 2000).
+Klein 2003), and soon after the beginning, or after the one before, none is given (Ward and Tsukahara 2000).
 
 So the robot nods to who speaks to it, a little, in a pause between words, when they have spoken for a while, and in
 any case a while later. Of a recognizer that tells words only when all is said no pause is known: there it nods when

@@ -86,7 +86,8 @@ class ResponsePolicy(HeadPolicy):
     def claim(self, now: Seconds, weaker: Sequence[Claim]) -> Claim | None:
         self._seen = now
         # Who seeks the robot's eyes while it attends to somebody else seeks them in vain.
-        others = {*self.scene.sight.present(now)} - {*self.scene.drawing(now)}
+        attended = [self.scene.listens_to] if self.scene.listens_to else self.scene.drawing(now)
+        others = {*self.scene.sight.present(now)} - {*attended}
         for id in [id for id, answer in self._open.items() if answer.until is not None and now >= answer.until]:
             del self._open[id]
         for answer in reversed(self._open.values()):

@@ -105,6 +105,8 @@ class HeadScene:
         """True if the robot's last turn is over, and no other has begun."""
         self.to_robot: tuple[str, ...] = ()
         """Those of whom it is known that they speak to the robot now, if a policy cares for that."""
+        self.listens_to = ""
+        """Who is heard, and may speak to the robot: to whom is known late, of short speeches when they are over."""
         self.words = 0.0
         """Number of words of the robot's fragment that was sent last."""
         self.owner = NOBODY
@@ -129,7 +131,7 @@ class HeadScene:
 
     def recognition_lost(self) -> None:
         """Drop what recognition told: the ends of its events and speeches will never come."""
-        self.to_robot, self._asked = (), {}
+        self.to_robot, self.listens_to, self._asked = (), "", {}
 
     def join(self, other: str, name: str) -> None:
         """Take two ids for one person, who is called `name` from now on."""

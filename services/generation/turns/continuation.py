@@ -8,10 +8,12 @@ from collections.abc import Collection, Iterator
 from typing import Literal
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.behavior_types import SYNC_POINTS, canonical_sync
 from engage_hri.schemas.behaviors import Behavior, Gesture, Hand, Head, Pointing
 from engage_hri.schemas.references import type_name
+from engage_hri.schemas.units import Seconds
 
 Limb = Hand | Literal["head"] | None
 """Part of the body that makes a stroke; None: either arm, as the body chooses."""
@@ -36,6 +38,10 @@ class Continuation(Struct, frozen=True):
     speech: str = ""
     glance: str = ""
     strokes: tuple[Stroke, ...] = ()
+    seen_after: Seconds = 0.0
+    """Seconds from now for which the eyes stay at least on what they have just come to."""
+    eyes_on: str = ""
+    """What that is."""
 
     @property
     def start(self) -> str:
@@ -57,7 +63,8 @@ class Continuation(Struct, frozen=True):
 
     def then(self, later: "Continuation") -> "Continuation":
         """Join this continuation with that of a later block: its words and glance go before."""
-        return Continuation(later.speech or self.speech, later.glance or self.glance, (*self.strokes, *later.strokes))
+        strokes = (*self.strokes, *later.strokes)
+        return replace(self, speech=later.speech or self.speech, glance=later.glance or self.glance, strokes=strokes)
 
     def frees(self, limb: Limb) -> Iterator[str]:
         """The sync points up to which strokes use `limb`, or may use it."""

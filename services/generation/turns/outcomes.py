@@ -14,7 +14,8 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.turns.interjections import Interjections
-from engage_hri.services.generation.turns.policy import Aborted, TurnPlan
+from engage_hri.services.generation.turns.plan import TurnPlan
+from engage_hri.services.generation.turns.robot_turns import Aborted
 from engage_hri.services.reports.same_people import renamed
 
 LOOKS_BACK: Seconds = 60.0

@@ -82,11 +82,15 @@ class AwaitPlacement(Struct, frozen=True):
 
 
 class Attendee(Struct, frozen=True):
-    """Person who is there. level: how engaged, as recognition tells. visit: how often they have come."""
+    """Person who is there. level: how engaged with the robot, as recognition tells. visit: how often they have come.
+
+    is_at_it: they look at what lies on the table, or at the table.
+    """
 
     id: str
     level: EngagementLevel = "unknown"
     visit: int = 1
+    is_at_it: bool = False
 
 
 class LookAround(Struct, frozen=True):
@@ -163,9 +167,13 @@ class Manager:
         return cast("tuple[Attendee, ...]", guests)
 
     def has_lost(self) -> Plan[bool]:
-        """Tell whether the person does nothing, and attends to the robot no more, though they are there."""
-        levels = [guest.level for guest in (yield from self._company()) if guest.id == self._person]
-        return self._ignored >= ATTEMPTS and levels == ["disengaged"]
+        """Tell whether the person does nothing, and attends to the robot no more, though they are there.
+
+        Who looks at the pieces thinks, however long: that is no contact with the robot, and no leaving either.
+        """
+        guests = [guest for guest in (yield from self._company()) if guest.id == self._person]
+        attends = [guest.level != "disengaged" or guest.is_at_it for guest in guests]
+        return self._ignored >= ATTEMPTS and attends == [False]
 
     def say(self, id: str, sentence: Sentence, *, look: bool = True) -> Plan[None]:
         """Say a full turn that asks for nothing."""

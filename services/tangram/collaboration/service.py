@@ -8,12 +8,14 @@ from functools import partial
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import EngageError
+from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.recognition import EngagementLevel, Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.client.feeds import Feed
 from engage_hri.services.client.robot import Robot
+from engage_hri.services.reports.ongoing_actions import ActionEvent
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 from engage_hri.services.tangram.collaboration import plans
@@ -40,10 +42,11 @@ async def collaborate(bus: Bus, ready: Ready, config: CollaborationConfig) -> No
     plan = plans.script(manager, turns(manager)) if config.mode == "scripted" else plans.task(manager)
     async with Robot.on(bus) as robot, asyncio.TaskGroup() as tasks:
         engine = _Engine(robot, bus, PiecesInView())
-        with robot.worlds() as worlds, robot.engagement() as levels:
+        with robot.worlds() as worlds, robot.engagement() as levels, robot.actions() as actions:
             watching = [
                 tasks.create_task(engine.watch(worlds), name="watch the table"),
                 tasks.create_task(engine.attend(levels), name="watch the people"),
+                tasks.create_task(engine.follow_looks(actions), name="watch their eyes"),
             ]
             tell_settings(bus, "collaboration", config)
             ready()
@@ -71,6 +74,8 @@ class _Engine:
         self._view = view
         self._seen = asyncio.Event()
         self._levels: dict[str, EngagementLevel] = {}
+        self._looks: dict[str, tuple[str, ...]] = {}
+        """What each person looks at."""
 
     async def watch(self, worlds: Feed[World]) -> None:
         async for world in worlds:
@@ -80,6 +85,11 @@ class _Engine:
     async def attend(self, levels: Feed[Statistics]) -> None:
         async for told in levels:
             self._levels[told.actor] = told.level
+
+    async def follow_looks(self, actions: Feed[ActionEvent]) -> None:
+        async for told in actions:
+            if isinstance(told, ActionBegan) and told.action == "look":
+                self._looks[told.actor] = told.targets
 
     async def grant(self, wish: plans.Wish) -> plans.Answer:
         now, view = self._robot.now(), self._view
@@ -97,8 +107,15 @@ class _Engine:
                 is_placed = partial(has_been_placed, piece, before)
                 return await self._wait_until(lambda at: is_placed(view.pieces(at)), now + timeout)
             case plans.LookAround():
+                table = {tangram_table().surface.id, *(piece.id for piece in view.pieces(now))}
                 return tuple(
-                    plans.Attendee(id, self._levels.get(id, "unknown"), view.visits[id]) for id in view.people(now)
+                    plans.Attendee(
+                        id,
+                        self._levels.get(id, "unknown"),
+                        view.visits[id],
+                        is_at_it=not table.isdisjoint(self._looks.get(id, ())),
+                    )
+                    for id in view.people(now)
                 )
             case plans.AwaitPerson(known=known):
                 await self._wait_until(lambda at: view.person(at) is not None, math.inf)

@@ -60,6 +60,7 @@ class Player:
         hidden: str = "",
         people: Sequence[str] = ("human",),
         level: EngagementLevel = "engaged",
+        is_at_it: bool = False,
         others: Callable[[int], tuple[Attendee, ...]] = lambda performed: (),
     ) -> None:
         self.pieces = {piece.id: TABLE.lying(piece, piece.start) for piece in TABLE.pieces}
@@ -69,6 +70,7 @@ class Player:
         self._hidden = hidden
         self._people = people
         self._level: EngagementLevel = level
+        self._is_at_it = is_at_it
         self._others = others
         self.pauses: list[float] = []
 
@@ -88,7 +90,8 @@ class Player:
                 case AwaitPlacement(piece=piece):
                     answer = self._place(piece)
                 case LookAround():
-                    answer = (Attendee(self._here, self._level), *self._others(len(self.performed)))
+                    person = Attendee(self._here, self._level, is_at_it=self._is_at_it)
+                    answer = (person, *self._others(len(self.performed)))
                 case AwaitPerson(known=known):
                     here = self._here
                     assert known in ("", *self._people)
@@ -249,9 +252,20 @@ def test_who_is_helped_is_shown_the_piece_and_its_place() -> None:
     assert [(it.target, it.minimum_reliability) for it in shown] == [("blue-square", 0.95), ("rectangle", 0.95)]
 
 
-@pytest.mark.parametrize(("level", "is_let_go"), [("disengaged", True), ("disengaging", False), ("engaged", False)])
-def test_who_follows_no_request_and_attends_no_more_is_let_go(level: EngagementLevel, is_let_go: bool) -> None:
-    player = Player(idle=1000, level=level)
+@pytest.mark.parametrize(
+    ("level", "is_at_it", "is_let_go"),
+    [
+        ("disengaged", False, True),
+        ("disengaged", True, False),
+        ("disengaging", False, False),
+        ("engaged", False, False),
+    ],
+)
+def test_who_follows_no_request_and_attends_no_more_is_let_go(
+    level: EngagementLevel, is_at_it: bool, is_let_go: bool
+) -> None:
+    """Who looks at the pieces thinks."""
+    player = Player(idle=1000, level=level, is_at_it=is_at_it)
 
     performed = player.play(task(manager()))
 

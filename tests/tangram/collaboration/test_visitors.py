@@ -83,6 +83,17 @@ async def test_who_does_nothing_and_looks_away_is_let_go_kindly(hub: MemoryHub) 
         assert [said for _, said in heard.said][-1] == LETS_GO
 
 
+async def test_who_looks_at_the_pieces_to_think_is_not_let_go(hub: MemoryHub) -> None:
+    async with visited(hub) as (heard, _), perceive("ann", hub=hub) as ann:
+        await ann.look_at("robot")
+        await asyncio.sleep(30.0)
+        await ann.look_at("table")
+        await asyncio.sleep(150.0)
+
+        assert heard.when("Please move the yellow piece")
+        assert not heard.when(LETS_GO)
+
+
 async def test_who_comes_is_greeted_once_and_again_when_they_come_again(hub: MemoryHub) -> None:
     async with visited(hub) as (heard, _):
         for stays in (30.0, 20.0):
