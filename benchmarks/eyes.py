@@ -8,12 +8,16 @@ python benchmarks/eyes.py [--pictures 24] [--page] [--json]     (`make eyes` fet
 import argparse
 import asyncio
 import json
+import sys
 import time
 from collections.abc import Sequence
 from multiprocessing import Pool
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from engage_hri.schemas.landmarks import FaceLandmarks
 from engage_hri.schemas.units import Stamp

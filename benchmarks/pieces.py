@@ -9,12 +9,16 @@ over the table once it has been seen. Colors are learned from one picture of oth
 import argparse
 import json
 import math
+import sys
 import time
 from collections.abc import Sequence
 from multiprocessing import Pool
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from engage_hri.schemas.units import Stamp
 from engage_hri.schemas.world import Entity
