@@ -52,7 +52,7 @@ from tests.perception.eyes.fetched import MODELS
 from tests.perception.eyes.film_of_looks import GRAINS, TURN, head_at, stray
 from tests.perception.eyes.people import CAMERA, JUDGED, Light, Person, Pose
 from tests.perception.eyes.people import drawn as drawn_people
-from tests.perception.pieces.tables import EVEN, EYE, STARTS, TABLE, Hand
+from tests.perception.pieces.tables import EVEN, EYE, STARTS, TABLE, THICK, TOP, Hand
 from tests.perception.pieces.tables import drawn as drawn_table
 from tests.perception.pieces.test_finding import flat
 from tests.perception.spoken import pink, voice
@@ -191,7 +191,7 @@ class FilmedRoom:
         """What the robot's eyes see of the table: what differs from one picture to the next, and what draws it."""
         poses = {each.id: (*each.position[:2], each.yaw) for each in self._table.pieces(now)}
         places = (self._table.hand(side, now) for side in HANDS) if self._table.seated else ()
-        hands = tuple(Hand((x + REACH, y)) for x, y, _ in places)
+        hands = tuple(Hand((x + REACH, y), above=max(z - TOP, THICK)) for x, y, z in places)
         state = tuple(poses.items()), hands
         return state, lambda: drawn_table(poses, EYE, EVEN._replace(noise=8), hands, seed=1, take=take)
 

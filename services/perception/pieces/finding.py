@@ -247,10 +247,9 @@ class PieceFinder:
         flat = self._flat.laid_out(image)
         around = light(flat, self._palette[TABLE])
         labels = labeled(flat, around, self._palette)
-        bare_table = np.maximum(around * np.array(self._palette[TABLE], np.float32), 1)
-        hands, covered = self._hands.find(flat / bare_table, (_summed(flat) > 0).astype(np.float32))
-        covered[(labels != UNKNOWN) & (labels != self._names.index(TABLE))] = 0  # a piece that it holds
-        labels[covered > 0] = UNKNOWN
+        is_piece = (labels != UNKNOWN) & (labels != self._names.index(TABLE))
+        covered = self._hands.cover(flat, around * np.array(self._palette[TABLE], np.float32), is_piece)
+        labels[covered] = UNKNOWN
         found, tone = [], _summed(cv2.GaussianBlur(flat, (0, 0), 1.0))
         for color in {shape.form.color: None for shape in self._shapes}:
             shapes = [shape for shape in self._shapes if shape.form.color == color]
@@ -260,7 +259,11 @@ class PieceFinder:
         bare = [shape.form.id for shape in away if self._is_bare(flat, around, covered, shape)]
         self._last |= {piece.id: np.array([piece.x, piece.y, piece.yaw]) for piece in found}
         self._count += 1
-        return FoundOnTable(tuple(found), tuple(bare), tuple(hands))
+        tops = np.zeros(labels.shape, np.float32)
+        for shape in self._shapes:
+            if shape.form.id in ids:
+                self._fill(tops, shape, self._last[shape.form.id], 1.0)
+        return FoundOnTable(tuple(found), tuple(bare), tuple(self._hands.hands(tops)))
 
     def _is_bare(self, flat: Any, around: Any, covered: Any, shape: _Shape) -> bool:
         """Tell whether the table is seen where a form lay last.
@@ -296,7 +299,7 @@ class PieceFinder:
                 break
             x, y, yaw = laid.pose.tolist()
             found.append(SpottedPiece(id, x, y, yaw, laid.seen, laid.spread, laid.turn_spread))
-            self._take(value, shape, laid.pose)
+            self._fill(value, shape, laid.pose, -1.0)  # what it explains is no other's
             seen = seen._replace(tops=np.minimum(tops, value))
             best = {each: self._judged(seen, shape, best[each]) for each, shape in waiting.items()}
             looks_everywhere = False
@@ -507,11 +510,11 @@ class PieceFinder:
         score = float((top > 0.5).mean()) + laid.support - foreign - beyond
         return laid._replace(score=score if is_there and is_known else 0.0, seen=own)
 
-    def _take(self, value: Any, shape: _Shape, pose: Floats) -> None:
-        """Take what a piece explains away from others of its color: its top and its walls."""
+    def _fill(self, value: Any, shape: _Shape, pose: Floats, filling: float) -> None:
+        """Fill what a piece explains, its top and its walls."""
         top = shape.outline * 1.03 @ _turning(pose[2]) + pose[:2]
         outline = cv2.convexHull(self._flat.at(np.concatenate([top, self._sunk(top)])).astype(np.float32))
-        cv2.fillConvexPoly(value, np.rint(outline[:, 0, ::-1]).astype(np.int32), -1.0)
+        cv2.fillConvexPoly(value, np.rint(outline[:, 0, ::-1]).astype(np.int32), filling)
 
 
 def learned(image: Image, table: TaskTable, flat: FlatTable) -> Palette:
