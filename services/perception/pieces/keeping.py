@@ -145,7 +145,7 @@ def _turned_alike(kept: _Kept, piece: SpottedPiece) -> SpottedPiece:
 
 
 def _see(kept: _Kept, piece: SpottedPiece, at: Seconds, hands: Iterable[SpottedHand]) -> None:
-    kept.seen, kept.bare = at, None
+    then, kept.seen, kept.bare = kept.seen, at, None
     kept.is_covered = False
     before, kept.elsewhere = kept.elsewhere, None
     if kept.pose is not None and piece.seen < WHOLE and _is_near(piece, kept.pose):
@@ -161,9 +161,7 @@ def _see(kept: _Kept, piece: SpottedPiece, at: Seconds, hands: Iterable[SpottedH
     kept.elsewhere = (at, piece)
     is_held = any(math.dist((hand.x, hand.y), (piece.x, piece.y)) < HELD for hand in hands)
     if before is None and is_held and kept.pose is not None:
-        kept.pose, kept.velocity = piece, (0.0, 0.0)  # told late, it would not have gone with the hand
-        kept.rests.clear()
-        return
+        before = then, kept.pose  # told late, it would not have gone with the hand
     if before is None:
         return  # a picture alone may err
     since, last = before
