@@ -85,7 +85,9 @@ class HandFinder:
         if not self._arms:
             self._bare = lit
             return np.zeros(flat.shape[:2], bool)
-        return self._finely(flat, covered, max(DIFFERS, NOISY * noise)) & ~is_piece
+        fine = self._finely(flat, covered, max(DIFFERS, NOISY * noise)) & ~is_piece
+        # Around a piece that is held colors mix: a line that is thinner than any finger.
+        return cv2.morphologyEx(fine.astype(np.uint8), cv2.MORPH_OPEN, AROUND) > 0
 
     def hands(self, tops: Any) -> list[SpottedHand]:
         """Tell the hands at the ends of these arms, without what they hold. tops: pixels of pieces that were found."""
