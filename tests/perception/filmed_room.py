@@ -219,7 +219,7 @@ class FilmedRoom:
 
 
 class FilmingFaces:
-    """The camera of the eyes, and LiteRT, in the place of a source in its own process. kept: a folder for its film."""
+    """The camera of the eyes, and LiteRT, in the place of a source in a process. kept: a folder for its film."""
 
     def __init__(self, room: FilmedRoom, kept: Path | None = None) -> None:
         self._room, self._finder = room, FaceFinder(MODELS, 4)

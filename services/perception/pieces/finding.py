@@ -237,7 +237,7 @@ class PieceFinder:
         self._flat, self._palette = flat, palette
         self._names = [*palette]
         self._shapes = [_Shape(form) for form in table.pieces]
-        self._hands = HandFinder(flat.is_table, flat.low, STEP, flat.eye, flat.height)
+        self._hands = HandFinder(flat.is_table, flat.low, STEP, flat.eye, flat.height, table.thickness)
         self._last: dict[str, Floats] = {}
         """Pose in which each was seen last."""
         self._count = 0

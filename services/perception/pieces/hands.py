@@ -44,13 +44,15 @@ class HandFinder:
     """Finds hands in pictures that follow one another, laid out flat.
 
     is_table: where the table is. low: place of the first pixel; step: size of one. eye: place of the camera over the
-    table, and height above the plane that is laid out.
+    table, and height above the plane that is laid out, which is that of pieces of some thickness.
     """
 
-    def __init__(self, is_table: Any, low: Floats, step: Meters, eye: Floats, height: Meters) -> None:
+    def __init__(
+        self, is_table: Any, low: Floats, step: Meters, eye: Floats, height: Meters, thickness: Meters
+    ) -> None:
         size = is_table.shape[1] // COARSE, is_table.shape[0] // COARSE
         self._size, self._low, self._step = size, low, step * COARSE
-        self._eye, self._sunk = eye, (height - HEIGHT) / height
+        self._eye, self._sunk = eye, (height + thickness - HEIGHT) / height
         self._is_table = cv2.resize(is_table, size, interpolation=cv2.INTER_AREA) > 0
         wide = 2 * round(RIM / self._step) + 1
         inner = cv2.erode(self._is_table.astype(np.uint8), np.ones((wide, wide), np.uint8), borderValue=0)
@@ -90,8 +92,8 @@ class HandFinder:
         return cv2.morphologyEx(fine.astype(np.uint8), cv2.MORPH_OPEN, AROUND) > 0
 
     def hands(self, tops: Any) -> list[SpottedHand]:
-        """Tell the hands at the ends of these arms, without what they hold. tops: pixels of pieces that were found."""
-        holds = cv2.dilate((self._coarse(tops.astype(np.float32)) > 0.3).astype(np.uint8), AROUND) > 0
+        """Tell hands at the ends of these arms, without what they hold. tops: pixels of the pieces that are seen."""
+        holds = cv2.dilate((self._coarse(tops) > DIFFERS).astype(np.uint8), AROUND) > 0
         large = (own for own in self._arms if own.sum() * self._step**2 >= SMALLEST)
         found = [self._hand(own & (~holds | self._rim)) for own in large]
         return [each for each in found if math.dist((each.x, each.y), (each.from_x, each.from_y)) >= REACHES]

@@ -111,8 +111,10 @@ class Manipulation:
         return min((self._rests_at(piece) for piece in self._pieces.values() if piece.holder), default=None)
 
     def _rests_at(self, piece: _Piece) -> Seconds:
-        """Time at which the moving piece rests. It is later if piece and hand are both out of sight, and if what is in
-        sight was told to move: a camera of two pictures a second has not looked again when `REST` is over.
+        """Time at which the moving piece rests.
+
+        It is later if piece and hand are both out of sight, and if what is in sight was told to move: a camera of two
+        pictures a second has not looked again when `REST` is over.
         """
         lost = piece.hidden and piece.holder not in self._hands
         return piece.moved_at + (MEMORY if lost or self._speed(piece) > STILL else REST)
