@@ -134,15 +134,19 @@ def test_a_pale_hand_that_stays_does_not_become_the_table():
     assert all(math.dist((each.x, each.y), (0.48 - MIDDLE, 0.21)) < 0.04 for [each] in found)
 
 
-def acts(film: Sequence[tuple[tuple[float, float] | None, tuple[float, float]]]) -> list[tuple[bool, float]]:
+Place = tuple[float, float] | None
+
+
+def acts(film: Sequence[tuple[Place, Place]]) -> list[tuple[bool, float]]:
     """When ann's acts with a square begin and end. film: where it is seen, and her hand; two pictures a second."""
     pieces, hands, manipulation = PieceKeeper(TABLE), HandKeeper(TABLE), Manipulation("robot", RecognitionConfig())
     told = []
     for number, (piece, hand) in enumerate(film):
         now = number / 2
-        seen = [SpottedPiece("blue-square", *piece, 0.3)] if piece is not None else []
-        palms = (spotted(*hand, (0.98, 0.2)),)
-        shown = pieces.feed(SpottedPieces(at=Stamp("", now), pieces=tuple(seen), hands=palms), now)
+        seen = (SpottedPiece("blue-square", *piece, 0.3),) if piece is not None else ()
+        palms = (spotted(*hand, (0.98, 0.2)),) if hand is not None else ()
+        bare = () if seen else ("blue-square",)
+        shown = pieces.feed(SpottedPieces(at=Stamp("", now), pieces=seen, bare=bare, hands=palms), now)
         known = hands.feed(palms, (ANN,), now)
         told += manipulation.feed(World(entities=(ANN, *shown, *known)), now)
     return [(change.began, change.at) for each in told for change in each.changes]
@@ -158,3 +162,13 @@ def test_a_piece_that_is_gone_with_the_hand_in_the_next_picture_was_taken_by_it(
     there, beside, away, hand = (0.56, 0.0), (0.6, 0.0), (0.6, 0.25), (0.65, 0.12)
 
     assert acts([(there, beside)] * 3 + [(None, hand)] + [((0.56, 0.25), away)] * 3) == [(True, 1.0), (False, 2.0)]
+
+
+@pytest.mark.parametrize("is_bare", [False, True])
+def test_a_piece_that_is_seen_again_where_a_hand_has_laid_it_was_moved_by_it(is_bare: bool):
+    there, beside, lays, leaves = (0.56, 0.0), (0.6, 0.0), (0.6, 0.25), (0.8, 0.2)
+    away = [(None, lays)] * (3 if is_bare else 1)
+    film = [*[(there, beside)] * 3, *away, ((0.56, 0.25), leaves), ((0.56, 0.25), None), ((0.56, 0.25), None)]
+    laid = 1.5 + len(away) / 2
+
+    assert acts(film) == [(True, 1.0), (False, laid)]
