@@ -190,8 +190,7 @@ class FilmedRoom:
     def top(self, now: Seconds, take: int) -> tuple[Any, Callable[[], Picture]]:
         """What the robot's eyes see of the table: what differs from one picture to the next, and what draws it."""
         poses = {each.id: (*each.position[:2], each.yaw) for each in self._table.pieces(now)}
-        places = (self._table.hand(side, now) for side in HANDS) if self._table.seated else ()
-        hands = tuple(Hand((x + REACH, y), above=max(z - TOP, THICK)) for x, y, z in places)
+        hands = tuple(held_at(self._table.hand(side, now)) for side in HANDS) if self._table.seated else ()
         state = tuple(poses.items()), hands
         return state, lambda: drawn_table(poses, EYE, EVEN._replace(noise=8), hands, seed=1, take=take)
 
@@ -213,6 +212,12 @@ class FilmedRoom:
             if since < until:
                 made[since:until] += said[since - begin : until - begin]
         return made
+
+
+def held_at(place: Vector) -> Hand:
+    """A hand that holds what lies at a place, as it is drawn."""
+    x, y, z = place
+    return Hand((x + REACH, y), above=max(z - TOP, THICK))
 
 
 # -- the senses' devices -------------------------------------------------------------------------------------------
