@@ -102,7 +102,7 @@ class HandFinder:
         return cv2.GaussianBlur(cv2.resize(value, self._size, interpolation=cv2.INTER_AREA), (0, 0), 1.0)
 
     def _change(self, now: Any, is_seen: Any) -> Any:
-        """How the light has changed since the picture before, by place and color.
+        """Tell how the light has changed since the picture before, by place and color.
 
         Of what has changed by much else than the rest it is not the light. Over `WIDE` it changes little: what is
         learned from near a hand is the light of a hand, for skin may look like wood.
