@@ -1,34 +1,46 @@
 """Eyes on rendered people of whom nothing was learned: faces found, errors of heads, processor time of a picture.
 
-python benchmarks/eyes.py [--pictures 24] [--page] [--json]     (`make eyes` fetches what it needs)
+python benchmarks/eyes.py [--pictures 24] [--first 100] [--page] [--json]     (`make eyes` fetches what it needs)
 
---pictures: of each of ten people. --page: what a page finds in the same ones, in Chromium, beside that.
+--pictures: of each of ten people. --first: number of the first person, as a seed of the pictures. --page: what a page
+finds in the same ones, in Chromium, beside that.
 """
 
 import argparse
 import asyncio
 import json
+import math
+import sys
 import time
 from collections.abc import Sequence
 from multiprocessing import Pool
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
 from engage_hri.schemas.landmarks import FaceLandmarks
+from engage_hri.schemas.recognition import SureLook
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.perception.eyes.config import EyesConfig
 from engage_hri.services.perception.eyes.head_pose import head, yaw_pitch
 from engage_hri.services.perception.eyes.looking import packed
 from engage_hri.services.perception.eyes.seeing import Seeing
 from engage_hri.services.perception.eyes.sources.litert import FaceFinder
+from engage_hri.services.recognition.perceive.sure_looks import Angles, SureLooks
 from tests.perception.eyes.cases import CHUNKS, cases
 from tests.perception.eyes.fetched import MODELS
 from tests.perception.eyes.page_faces import found as found_by_page
 from tests.perception.eyes.people import CAMERA, JUDGED
 
 FIRST = 100
-"""Number of the first person who is judged, as a seed: those who are learned from have others."""
+"""Number of the first person who is judged, as a seed: those who are learned from have smaller ones."""
+SURE = 6
+"""Pictures of each person in which it is known where the head points, for what is learned of them."""
+Chunk = tuple[int, int, int, int]
+"""Person, seed of the person, part, and number of pictures in it."""
 TIMES = 20
 """How often each picture is looked at, for its processor time."""
 
@@ -36,7 +48,8 @@ TIMES = 20
 class Measured(NamedTuple):
     """A picture. yaw, pitch, beside: errors, degrees; None: no face was found. distance: share of the true one.
 
-    sure: errors of yaw and pitch as shares of the stated deviations. look, behind: processor milliseconds.
+    sure: errors of yaw and pitch as shares of the stated deviations. told, true: angles of the head from the line to
+    the camera, and deviations that are stated, degrees. look, behind: processor milliseconds.
     """
 
     person: int
@@ -47,12 +60,15 @@ class Measured(NamedTuple):
     beside: float = 0.0
     distance: float = 0.0
     sure: tuple[float, float] = (0.0, 0.0)
+    told: Angles = (0.0, 0.0)
+    true: Angles = (0.0, 0.0)
+    stated: Angles = (0.0, 0.0)
 
 
-def measured(chunk: tuple[int, int, int]) -> list[Measured]:
-    person, number, count = chunk
+def measured(chunk: Chunk) -> list[Measured]:
+    person, seed, number, count = chunk
     found = []
-    for case in cases(JUDGED[person], FIRST + person, number, count):
+    for case in cases(JUDGED[person], seed, number, count):
         finder = FaceFinder(MODELS, 4)
         begin = time.process_time()
         for _ in range(TIMES):
@@ -71,11 +87,15 @@ def measured(chunk: tuple[int, int, int]) -> list[Measured]:
         wrong = np.array(yaw_pitch(seen.ahead)) - yaw_pitch(case.pose.ahead)
         beside = np.arccos(np.clip(seen.ahead @ case.pose.ahead, -1, 1))
         yaw, pitch = np.degrees(wrong).tolist()
+        back = yaw_pitch(-np.array(case.pose.at))
+        told_at, true_at = (np.degrees(np.subtract(yaw_pitch(way), back)) for way in (seen.ahead, case.pose.ahead))
         found.append(
             Measured(
                 person, look, behind, yaw, pitch, float(np.degrees(beside)),
                 float(seen.distance / np.linalg.norm(case.pose.at)),
                 (abs(wrong[0]) / seen.yaw_spread, abs(wrong[1]) / seen.pitch_spread),
+                (told_at[0], told_at[1]), (true_at[0], true_at[1]),
+                (math.degrees(seen.yaw_spread), math.degrees(seen.pitch_spread)),
             )
         )  # fmt: skip
     return found
@@ -111,12 +131,26 @@ def summary(rows: Sequence[Measured]) -> dict[str, float]:
     return {name: round(float(value), 2) for name, value in figures.items()}
 
 
-def in_a_page(chunks: Sequence[tuple[int, int, int]]) -> dict[str, float]:
+def after_sure_looks(rows: Sequence[Measured]) -> dict[str, float]:
+    """Figures of the other pictures when the first ones of each person were looks of which it is known at what."""
+    wrong = []
+    for person in sorted({row.person for row in rows}):
+        own, looks = [row for row in rows if row.person == person and row.yaw is not None], SureLooks()
+        looks.remember(SureLook(head=row.told, aim=row.true, spread=row.stated) for row in own[:SURE])
+        wrong += [np.subtract(looks.aim(row.told, row.stated)[0], row.true) for row in own[SURE:]]
+    yaw, pitch = np.array(wrong).T
+    figures = {
+        "after six sure looks: beside the truth, mean": np.hypot(yaw, pitch).mean(),
+        "... yaw, bias": yaw.mean(),
+        "... pitch, bias": pitch.mean(),
+    }
+    return {name: round(float(value), 2) for name, value in figures.items()}
+
+
+def in_a_page(chunks: Sequence[Chunk]) -> dict[str, float]:
     """Compare what a page finds with what LiteRT does."""
     pictures = [
-        case.picture
-        for person, number, count in chunks
-        for case in cases(JUDGED[person], FIRST + person, number, count)
+        case.picture for person, seed, number, count in chunks for case in cases(JUDGED[person], seed, number, count)
     ]
     apart, missed = [], 0
     for by_page, picture in zip(asyncio.run(found_by_page(pictures)), pictures, strict=True):
@@ -137,13 +171,15 @@ def in_a_page(chunks: Sequence[tuple[int, int, int]]) -> dict[str, float]:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--pictures", type=int, default=24)
+    parser.add_argument("--first", type=int, default=FIRST)
     parser.add_argument("--page", action="store_true")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
-    chunks = [(who, part, options.pictures // CHUNKS) for who in range(len(JUDGED)) for part in range(CHUNKS)]
+    parts = [(who, part) for who in range(len(JUDGED)) for part in range(CHUNKS)]
+    chunks = [(who, options.first + who, part, options.pictures // CHUNKS) for who, part in parts]
     with Pool(2) as pool:
         rows = [row for found in pool.map(measured, chunks, 1) for row in found]
-    figures = summary(rows) | (in_a_page(chunks) if options.page else {})
+    figures = summary(rows) | after_sure_looks(rows) | (in_a_page(chunks) if options.page else {})
     if options.json:
         print(json.dumps(figures))
         return

@@ -7,8 +7,12 @@ Of each film twice: as it is, and after six looks of which it is known at what t
 
 import argparse
 import json
+import sys
 from collections.abc import Iterator, Sequence
 from multiprocessing import Pool
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from engage_hri.schemas.landmarks import FaceLandmarks
 from engage_hri.schemas.perception import HeadPose

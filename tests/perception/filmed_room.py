@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from imageio_ffmpeg import write_frames
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.landmarks import FaceLandmarks
@@ -51,7 +52,7 @@ from tests.perception.eyes.fetched import MODELS
 from tests.perception.eyes.film_of_looks import GRAINS, TURN, head_at, stray
 from tests.perception.eyes.people import CAMERA, JUDGED, Light, Person, Pose
 from tests.perception.eyes.people import drawn as drawn_people
-from tests.perception.pieces.tables import EVEN, EYE, STARTS, TABLE, Hand
+from tests.perception.pieces.tables import EVEN, EYE, STARTS, TABLE, THICK, TOP, Hand
 from tests.perception.pieces.tables import drawn as drawn_table
 from tests.perception.pieces.test_finding import flat
 from tests.perception.spoken import pink, voice
@@ -189,8 +190,7 @@ class FilmedRoom:
     def top(self, now: Seconds, take: int) -> tuple[Any, Callable[[], Picture]]:
         """What the robot's eyes see of the table: what differs from one picture to the next, and what draws it."""
         poses = {each.id: (*each.position[:2], each.yaw) for each in self._table.pieces(now)}
-        places = (self._table.hand(side, now) for side in HANDS) if self._table.seated else ()
-        hands = tuple(Hand((x + REACH, y)) for x, y, _ in places)
+        hands = tuple(held_at(self._table.hand(side, now)) for side in HANDS) if self._table.seated else ()
         state = tuple(poses.items()), hands
         return state, lambda: drawn_table(poses, EYE, EVEN._replace(noise=8), hands, seed=1, take=take)
 
@@ -214,14 +214,21 @@ class FilmedRoom:
         return made
 
 
+def held_at(place: Vector) -> Hand:
+    """A hand that holds what lies at a place, as it is drawn."""
+    x, y, z = place
+    return Hand((x + REACH, y), above=max(z - TOP, THICK))
+
+
 # -- the senses' devices -------------------------------------------------------------------------------------------
 
 
 class FilmingFaces:
-    """The camera of the eyes, and LiteRT, in the place of a source in its own process."""
+    """The camera of the eyes, and LiteRT, in the place of a source in a process. kept: a folder for its film."""
 
-    def __init__(self, room: FilmedRoom) -> None:
+    def __init__(self, room: FilmedRoom, kept: Path | None = None) -> None:
         self._room, self._finder = room, FaceFinder(MODELS, 4)
+        self._keep = _keeping(kept, "faces.mp4", FACES_A_SECOND)
 
     def __call__(self, *order: object) -> "FilmingFaces":
         return self
@@ -231,7 +238,9 @@ class FilmingFaces:
         now = asyncio.get_running_loop().time
         while True:
             at = now()
-            faces = tuple(packed(*face) for face in self._finder.find(self._room.faces(at)))
+            picture = self._room.faces(at)
+            self._keep(picture)
+            faces = tuple(packed(*face) for face in self._finder.find(picture))
             await asyncio.sleep(LOOKING)
             yield FaceLandmarks(at=Stamp("", at), width=CAMERA.width, height=CAMERA.height, faces=faces)
             await asyncio.sleep(at + 1 / FACES_A_SECOND - now())
@@ -241,11 +250,12 @@ class FilmingTable:
     """The camera over the table, and what finds pieces in its pictures.
 
     While nothing on the table moves its pictures differ by their noise alone: after some of them what was found in
-    these is told in turn.
+    these is told in turn. kept: a folder for the film.
     """
 
-    def __init__(self, room: FilmedRoom) -> None:
+    def __init__(self, room: FilmedRoom, kept: Path | None = None) -> None:
         self._room = room
+        self._keep = _keeping(kept, "table.mp4", 1 / SPOTTING)
         self._finder = PieceFinder(TABLE, flat(), _palette())
 
     def __call__(self, *order: object) -> "FilmingTable":
@@ -260,11 +270,33 @@ class FilmingTable:
             if state != before:
                 before, found = state, []
             if len(found) < TAKES:
-                found.append(self._finder.find(draw()))
+                picture = draw()
+                found.append(self._finder.find(picture))
+            self._keep(picture)
             told = found[number % TAKES] if len(found) == TAKES else found[-1]
             number += 1
             await asyncio.sleep(SPOTTING)
             yield SpottedPieces(at=Stamp("", at), **told._asdict())
+
+
+def _keeping(folder: Path | None, name: str, rate: float) -> Callable[[Picture], None]:
+    """What keeps pictures as a film, to be looked at; nothing, without a folder."""
+    if folder is None:
+        return lambda picture: None
+    film: Any = None
+
+    def keep(picture: Picture) -> None:
+        nonlocal film
+        if film is None:
+            folder.mkdir(parents=True, exist_ok=True)
+            quick = ["-preset", "ultrafast"]  # noise is dear to encode
+            film = write_frames(
+                str(folder / name), picture.shape[1::-1], fps=rate, macro_block_size=1, output_params=quick
+            )
+            film.send(None)
+        film.send(np.ascontiguousarray(picture))
+
+    return keep
 
 
 def microphone(room: FilmedRoom) -> Any:

@@ -169,9 +169,10 @@ def labeled(flat: NDArray[np.float32], around: NDArray[np.float32], palette: Pal
     soft = cv2.GaussianBlur(flat, (0, 0), 0.8)
     labels = np.full(flat.shape[:2], UNKNOWN, np.int8)
     ground = _distance(soft.reshape(-1, 3), around.reshape(-1, 3), palette[TABLE]).reshape(labels.shape)
-    ground[soft.max(2) == 0] = np.inf
+    is_seen = _summed(soft) > 0
+    ground[~is_seen] = np.inf
     labels[ground < FAR] = names.index(TABLE)
-    rest = np.nonzero((ground > FAR / 3) & (soft.max(2) > 0))
+    rest = np.nonzero((ground > FAR / 3) & is_seen)
     pixels, lights, best = soft[rest], around[rest], np.minimum(ground[rest], FAR)
     found = labels[rest]
     for number, name in enumerate(names):
@@ -190,8 +191,13 @@ def _distance(pixels: Any, lights: Any, color: Sequence[float]) -> Any:
     for shade in SHADES:
         expected = np.minimum(full * np.float32(shade), 255)
         spread = NOISE**2 + (TINT * expected) ** 2
-        least = np.minimum(least, ((pixels - expected) ** 2 / spread).sum(1))
+        least = np.minimum(least, _summed((pixels - expected) ** 2 / spread))
     return np.sqrt(least / 3)
+
+
+def _summed(colors: Any) -> Any:
+    """Red, green and blue added: four times as fast as `sum`, whose loop is over these three."""
+    return colors[..., 0] + colors[..., 1] + colors[..., 2]
 
 
 class _Shape:
@@ -231,7 +237,7 @@ class PieceFinder:
         self._flat, self._palette = flat, palette
         self._names = [*palette]
         self._shapes = [_Shape(form) for form in table.pieces]
-        self._hands = HandFinder(flat.is_table, flat.low, STEP, flat.eye, flat.height)
+        self._hands = HandFinder(flat.is_table, flat.low, STEP, flat.eye, flat.height, table.thickness)
         self._last: dict[str, Floats] = {}
         """Pose in which each was seen last."""
         self._count = 0
@@ -241,20 +247,23 @@ class PieceFinder:
         flat = self._flat.laid_out(image)
         around = light(flat, self._palette[TABLE])
         labels = labeled(flat, around, self._palette)
-        bare_table = np.maximum(around * np.array(self._palette[TABLE], np.float32), 1)
-        hands, covered = self._hands.find(flat / bare_table, (flat.max(2) > 0).astype(np.float32))
-        covered[(labels != UNKNOWN) & (labels != self._names.index(TABLE))] = 0  # a piece that it holds
-        labels[covered > 0] = UNKNOWN
-        found = []
+        is_piece = (labels != UNKNOWN) & (labels != self._names.index(TABLE))
+        covered = self._hands.cover(flat, around * np.array(self._palette[TABLE], np.float32), is_piece)
+        labels[covered] = UNKNOWN
+        found, tone = [], _summed(cv2.GaussianBlur(flat, (0, 0), 1.0))
         for color in {shape.form.color: None for shape in self._shapes}:
             shapes = [shape for shape in self._shapes if shape.form.color == color]
-            found += self._of_color(flat, labels, covered, self._names.index(color), shapes)
+            found += self._of_color(flat, tone, labels, covered, self._names.index(color), shapes)
         ids = {piece.id for piece in found}
         away = [shape for shape in self._shapes if shape.form.id not in ids]
         bare = [shape.form.id for shape in away if self._is_bare(flat, around, covered, shape)]
         self._last |= {piece.id: np.array([piece.x, piece.y, piece.yaw]) for piece in found}
         self._count += 1
-        return FoundOnTable(tuple(found), tuple(bare), tuple(hands))
+        tops = np.zeros(labels.shape, np.float32)
+        for shape in self._shapes:
+            if shape.form.id in ids:
+                self._fill(tops, shape, self._last[shape.form.id], 1.0)
+        return FoundOnTable(tuple(found), tuple(bare), tuple(self._hands.hands(tops)))
 
     def _is_bare(self, flat: Any, around: Any, covered: Any, shape: _Shape) -> bool:
         """Tell whether the table is seen where a form lay last.
@@ -271,11 +280,11 @@ class PieceFinder:
         return bool((np.abs(seen - expected) < BARE * expected + NOISE / 2).all())
 
     def _of_color(
-        self, flat: Any, labels: Labels, covered: Any, number: int, shapes: Iterable[_Shape]
+        self, flat: Any, tone: Any, labels: Labels, covered: Any, number: int, shapes: Iterable[_Shape]
     ) -> list[SpottedPiece]:
         """Find the pieces of one color: the one that explains most first; what it explains is no other's."""
         value = np.where(labels == number, 1.0, np.where(labels == UNKNOWN, 0.0, -1.0)).astype(np.float32)
-        tops = self._tops(flat, value)
+        tops = self._tops(tone, value)
         seen, found = _Seen(flat, value, tops, covered), []
         looks_everywhere = (self._count + number) % AGAIN == 0
         waiting = {shape.form.id: shape for shape in shapes}
@@ -290,7 +299,7 @@ class PieceFinder:
                 break
             x, y, yaw = laid.pose.tolist()
             found.append(SpottedPiece(id, x, y, yaw, laid.seen, laid.spread, laid.turn_spread))
-            self._take(value, shape, laid.pose)
+            self._fill(value, shape, laid.pose, -1.0)  # what it explains is no other's
             seen = seen._replace(tops=np.minimum(tops, value))
             best = {each: self._judged(seen, shape, best[each]) for each, shape in waiting.items()}
             looks_everywhere = False
@@ -326,13 +335,13 @@ class PieceFinder:
         cv2.fillConvexPoly(covers, np.rint(top - low - 0.5).astype(np.int32), 1)
         return float((value * covers).sum() - ((value > 0.5) & (covers == 0)).sum()) / max(int(covers.sum()), 1)
 
-    def _tops(self, flat: Any, value: Any) -> Any:
+    def _tops(self, tone: Any, value: Any) -> Any:
         """Values in which walls count less than tops: most of what is seen of a piece is its top, and walls are
         darker or brighter.
         """
         mask = cv2.morphologyEx((value > 0).astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
         count, numbers, boxes, _ = cv2.connectedComponentsWithStats(mask)
-        tops, tone = value.copy(), cv2.GaussianBlur(flat, (0, 0), 1.0).sum(2)
+        tops = value.copy()
         for number in range(1, count):
             left, top, wide, tall, _ = boxes[number]
             box = np.s_[top : top + tall, left : left + wide]
@@ -501,11 +510,11 @@ class PieceFinder:
         score = float((top > 0.5).mean()) + laid.support - foreign - beyond
         return laid._replace(score=score if is_there and is_known else 0.0, seen=own)
 
-    def _take(self, value: Any, shape: _Shape, pose: Floats) -> None:
-        """Take what a piece explains away from others of its color: its top and its walls."""
+    def _fill(self, value: Any, shape: _Shape, pose: Floats, filling: float) -> None:
+        """Fill what a piece explains, its top and its walls."""
         top = shape.outline * 1.03 @ _turning(pose[2]) + pose[:2]
         outline = cv2.convexHull(self._flat.at(np.concatenate([top, self._sunk(top)])).astype(np.float32))
-        cv2.fillConvexPoly(value, np.rint(outline[:, 0, ::-1]).astype(np.int32), -1.0)
+        cv2.fillConvexPoly(value, np.rint(outline[:, 0, ::-1]).astype(np.int32), filling)
 
 
 def learned(image: Image, table: TaskTable, flat: FlatTable) -> Palette:

@@ -43,7 +43,8 @@ REACH: Meters = 0.15
 SWIFT = 1.5
 """Distance, and more for each second, at which a hand is the same from one picture to the next."""
 HELD: Meters = 0.12
-"""Distance from the middle of a hand within which a piece goes with it: then one picture is enough."""
+"""Distance from the middle of a hand, in this picture or the last, within which a piece goes with it, or was laid by
+it: then one picture is enough."""
 COVERED: Probability = 0.3
 """Confidence in where a piece lies that is not seen."""
 PATIENCE: Seconds = 0.4
@@ -73,15 +74,18 @@ class PieceKeeper:
     def __init__(self, table: TaskTable) -> None:
         self._table = table
         self._kept = {form.id: _Kept(form, deque()) for form in table.pieces}
+        self._hands: tuple[SpottedHand, ...] = ()
+        """Of the last picture: in this one they may have laid down what they held."""
 
     def feed(self, spotted: SpottedPieces, at: Seconds) -> tuple[Entity, ...]:
         """Take what is spotted in a picture. Returns all pieces as they are to be told."""
         seen = {piece.id: piece for piece in spotted.pieces}
         for id, kept in self._kept.items():
             if id in seen:
-                _see(kept, _turned_alike(kept, seen[id]), at, spotted.hands)
+                _see(kept, _turned_alike(kept, seen[id]), at, (*self._hands, *spotted.hands))
             else:
                 _miss(kept, at, is_bare=id in spotted.bare)
+        self._hands = spotted.hands
         return tuple(self._entities())
 
     def _entities(self) -> Iterator[Entity]:
@@ -145,7 +149,7 @@ def _turned_alike(kept: _Kept, piece: SpottedPiece) -> SpottedPiece:
 
 
 def _see(kept: _Kept, piece: SpottedPiece, at: Seconds, hands: Iterable[SpottedHand]) -> None:
-    kept.seen, kept.bare = at, None
+    then, kept.seen, kept.bare = kept.seen, at, None
     kept.is_covered = False
     before, kept.elsewhere = kept.elsewhere, None
     if kept.pose is not None and piece.seen < WHOLE and _is_near(piece, kept.pose):
@@ -160,10 +164,8 @@ def _see(kept: _Kept, piece: SpottedPiece, at: Seconds, hands: Iterable[SpottedH
         return
     kept.elsewhere = (at, piece)
     is_held = any(math.dist((hand.x, hand.y), (piece.x, piece.y)) < HELD for hand in hands)
-    if before is None and is_held and kept.pose is not None:
-        kept.pose, kept.velocity = piece, (0.0, 0.0)  # told late, it would not have gone with the hand
-        kept.rests.clear()
-        return
+    if before is None and is_held:
+        before = then, kept.pose or piece  # told late, it would not have gone with the hand
     if before is None:
         return  # a picture alone may err
     since, last = before

@@ -28,6 +28,8 @@ SMOOTHING: Seconds = 0.15
 """Time over which places of pieces are averaged: two or three frames of a camera. Ours."""
 REST: Seconds = 0.3
 """Time for which a piece rests before its manipulation is over: people stop for shorter times on the way. Ours."""
+STILL = 0.05
+"""Metres a second up to which what is told to move may rest: hands tremble, and are measured anew each time."""
 ALONG = 0.5
 """Share of the piece's way that a hand must have gone meanwhile, to have moved it."""
 FOLLOW = 0.1
@@ -50,6 +52,8 @@ class _Piece(Struct):
     """Place where it may be coming to rest, from `moved_at` until `paused_at` at least."""
     moved_at: Seconds
     paused_at: Seconds
+    velocity: Vector = (0.0, 0.0, 0.0)
+    """As it was told when it was seen last."""
     holder: str = ""
     """Hand that moves the piece; empty while it rests."""
     grip: Vector = (0.0, 0.0, 0.0)
@@ -107,9 +111,18 @@ class Manipulation:
         return min((self._rests_at(piece) for piece in self._pieces.values() if piece.holder), default=None)
 
     def _rests_at(self, piece: _Piece) -> Seconds:
-        """Time at which the moving piece rests. It is later if piece and hand are both out of sight."""
+        """Time at which the moving piece rests.
+
+        It is later if piece and hand are both out of sight, and if what is in sight was told to move: a camera of two
+        pictures a second has not looked again when `REST` is over.
+        """
         lost = piece.hidden and piece.holder not in self._hands
-        return piece.moved_at + (MEMORY if lost else REST)
+        return piece.moved_at + (MEMORY if lost or self._speed(piece) > STILL else REST)
+
+    def _speed(self, piece: _Piece) -> float:
+        """Metres a second, as told last, of the moving piece; of the hand that hides it."""
+        hand = self._hands.get(piece.holder)
+        return math.hypot(*(hand.velocity if piece.hidden and hand is not None else piece.velocity))
 
     def feed(self, world: World, at: Seconds) -> list[PersonChanges]:
         """Take the world at `at`, later than the last. Returns the manipulations that began and ended."""
@@ -151,6 +164,7 @@ class Manipulation:
         if piece is None:
             place = entity.position
             self._pieces[id] = piece = _Piece(place, at, self._hands, pause=place, moved_at=at, paused_at=at)
+        piece.velocity = entity.velocity
         place = self._averaged(piece, entity.position, at)
         self._pause(piece, place, at)
         found = []
@@ -176,6 +190,12 @@ class Manipulation:
         if not piece.hidden:
             piece.hidden = True
             piece.sights.clear()
+            # Between two pictures a hand may take it away: it was there in the one before.
+            piece.touched |= {
+                hand: self._before
+                for hand, then in piece.hands_then.items()
+                if hand in self._hands and piece.still_at == self._before and self._reaches(then, piece.place)
+            }
         if not piece.holder:
             for hand, entity in self._hands.items():
                 here_before = piece.touched.get(hand, self._before) == self._before

@@ -6,6 +6,7 @@ are wanted: the floor, the table with its grain, the shadows on it, the walls of
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 from typing import Any, NamedTuple
 
 import cv2
@@ -34,6 +35,11 @@ STARTS: dict[str, Pose] = {
 GOALS: dict[str, Pose] = {each.id: (each.goal.x, each.goal.y, math.radians(each.goal.yaw)) for each in TABLE.pieces}
 FOOTPRINTS = {each.id: np.array(each.footprint) for each in TABLE.pieces}
 COLORS = {each.id: each.color for each in TABLE.pieces}
+
+
+PUSHES = 200
+TOUCHING = 0.0002
+"""Metres by which pieces may overlap that count as touching."""
 
 
 class Eye(NamedTuple):
@@ -179,9 +185,10 @@ def layout(rng: np.random.Generator) -> dict[str, Pose]:
         if id in built:
             x, y, turn = GOALS[id]
             poses[id] = (x + rng.normal(0, 0.0015), y + rng.normal(0, 0.0015), turn + math.radians(rng.normal(0, 2)))
+    poses = _pushed(poses)
     waiting = [id for id in ids if id not in built]
     if waiting and rng.random() < 0.5:
-        poses |= _laid_wrongly(waiting[0], poses, rng)
+        poses = _pushed(poses | _laid_wrongly(waiting[0], poses, rng))
     for id in waiting:
         if id in poses:
             continue
@@ -198,6 +205,35 @@ def layout(rng: np.random.Generator) -> dict[str, Pose]:
                 poses[id] = pose
                 break
     return poses
+
+
+def _pushed(poses: Mapping[str, Pose]) -> dict[str, Pose]:
+    """The same pieces where none is in another: each pair that overlaps pushes itself apart, as thick pieces do."""
+    lying = dict(poses)
+    for _ in range(PUSHES):
+        overlaps = [(a, b, _into(a, lying[a], b, lying[b])) for a, b in combinations(lying, 2)]
+        if not any(way.any() for *_, way in overlaps):
+            break
+        for a, b, (dx, dy) in overlaps:
+            for id, share in ((a, -0.55), (b, 0.55)):
+                x, y, turn = lying[id]
+                lying[id] = (x + share * dx, y + share * dy, turn)
+    return lying
+
+
+def _into(id: str, pose: Pose, other: str, where: Pose) -> Floats:
+    """The least way by which another piece has to go to be out of this one; zero if it is."""
+    mine, theirs = corners(id, pose), corners(other, where)
+    least, way = math.inf, np.zeros(2)
+    for outline, sign in ((mine, 1.0), (theirs, -1.0)):
+        for a, b in zip(outline, np.roll(outline, -1, 0), strict=True):
+            normal = sign * np.array([b[1] - a[1], a[0] - b[0]]) / np.linalg.norm(b - a)
+            deep = float((mine @ normal).max() - (theirs @ normal).min())
+            if deep < TOUCHING:
+                return np.zeros(2)
+            if deep < least:
+                least, way = deep, deep * normal
+    return way
 
 
 def _laid_wrongly(id: str, poses: Mapping[str, Pose], rng: np.random.Generator) -> dict[str, Pose]:

@@ -1,14 +1,16 @@
 """The rules of Appendix A, twice: those of the house, and those that the tests of pieces recompute from its text."""
 
 import math
+from itertools import combinations
 
+import cv2
 import numpy as np
 
 from engage_hri.schemas.footprints import PiecePose
 from engage_hri.schemas.relations import relations
 from engage_hri.services.tangram.collaboration.task import Goal
 from tests.perception.pieces import appendix_a
-from tests.perception.pieces.tables import GOALS, TABLE, Pose, layout
+from tests.perception.pieces.tables import GOALS, TABLE, Pose, corners, layout
 
 
 def of_the_house(poses: dict[str, Pose]) -> set[tuple[str, str, str]]:
@@ -27,6 +29,17 @@ def test_both_find_the_same_on_tables_that_people_lay():
         assert of_the_house(poses) == expected
 
     assert number > 400
+
+
+def test_no_piece_of_a_drawn_table_lies_in_another():
+    def into(a: str, b: str, poses: dict[str, Pose]) -> float:
+        one, other = (np.float32(1000 * corners(id, poses[id])) for id in (a, b))  # millimetres
+        return cv2.intersectConvexConvex(one, other)[0]
+
+    tables = [layout(np.random.default_rng(seed)) for seed in range(40)]
+
+    assert max(into(a, b, poses) for poses in tables for a, b in combinations(poses, 2)) < 15
+    assert into("rectangle", "blue-square", GOALS | {"blue-square": GOALS["rectangle"]}) > 1000
 
 
 def test_both_find_all_that_touches_in_the_figure():

@@ -1,13 +1,14 @@
 """Hands over a drawn table: found by where they come from, whatever their skin, and told as hands of a person."""
 
 import math
+from collections.abc import Sequence
 
 import pytest
 
 from engage_hri.schemas.units import Stamp
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.perception.pieces.keeping import HandKeeper, PieceKeeper
-from engage_hri.services.perception.pieces.spotting import SpottedHand, SpottedPieces
+from engage_hri.services.perception.pieces.spotting import SpottedHand, SpottedPiece, SpottedPieces
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.perceive.manipulation import Manipulation
 from tests.perception.pieces.tables import SKINS, STARTS, TABLE, Hand, Light, Pose, drawn
@@ -109,3 +110,65 @@ def test_a_piece_that_is_carried_before_a_slow_camera_is_an_act_of_who_carries_i
     assert [(change.began, change.action, change.targets) for each in told for change in each.changes] == [
         (True, "act", ("blue-square",)), (False, "act", ("blue-square",))
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("skin", range(len(SKINS)))
+def test_what_a_hand_holds_is_found_and_is_not_the_hand(skin: int):
+    looks, (x, y, turn) = finder(), (0.711, 0.127, 1.667)
+    hand = Hand((x + 0.1, y), above=0.03, skin=skin)
+    looks.find(drawn(STARTS, seed=skin))
+    seen = looks.find(drawn({**STARTS, "yellow-triangle": (x, y, turn)}, hands=[hand], seed=skin, take=1))
+
+    [held] = [each for each in seen.pieces if each.id == "yellow-triangle"]
+    assert math.dist((held.x, held.y), (x, y)) < 0.003
+    [found] = seen.hands
+    assert math.dist((found.x, found.y), (hand.at[0] - MIDDLE, y)) < 0.06
+
+
+def test_a_pale_hand_that_stays_does_not_become_the_table():
+    """Its skin is like the wood in this light."""
+    looks, hand = finder(), Hand((0.48, 0.21), above=0.03)
+    looks.find(drawn(STARTS, seed=1))
+    found = [looks.find(drawn(STARTS, hands=[hand], seed=1, take=take)).hands for take in range(1, 4)]
+
+    assert all(math.dist((each.x, each.y), (0.48 - MIDDLE, 0.21)) < 0.04 for [each] in found)
+
+
+Place = tuple[float, float] | None
+
+
+def acts(film: Sequence[tuple[Place, Place]]) -> list[tuple[bool, float]]:
+    """When ann's acts with a square begin and end. film: where it is seen, and her hand; two pictures a second."""
+    pieces, hands, manipulation = PieceKeeper(TABLE), HandKeeper(TABLE), Manipulation("robot", RecognitionConfig())
+    told = []
+    for number, (piece, hand) in enumerate(film):
+        now = number / 2
+        seen = (SpottedPiece("blue-square", *piece, 0.3),) if piece is not None else ()
+        palms = (spotted(*hand, (0.98, 0.2)),) if hand is not None else ()
+        bare = () if seen else ("blue-square",)
+        shown = pieces.feed(SpottedPieces(at=Stamp("", now), pieces=seen, bare=bare, hands=palms), now)
+        known = hands.feed(palms, (ANN,), now)
+        told += manipulation.feed(World(entities=(ANN, *shown, *known)), now)
+    return [(change.began, change.at) for each in told for change in each.changes]
+
+
+def test_a_piece_that_is_on_its_way_for_several_pictures_is_one_act():
+    way = [0.56, 0.56, 0.56, 0.64, 0.72, 0.80, 0.80, 0.80]
+
+    assert acts([((x, 0.0), (x + 0.05, 0.0)) for x in way]) == [(True, 1.0), (False, 2.5)]
+
+
+def test_a_piece_that_is_gone_with_the_hand_in_the_next_picture_was_taken_by_it():
+    there, beside, away, hand = (0.56, 0.0), (0.6, 0.0), (0.6, 0.25), (0.65, 0.12)
+
+    assert acts([(there, beside)] * 3 + [(None, hand)] + [((0.56, 0.25), away)] * 3) == [(True, 1.0), (False, 2.0)]
+
+
+@pytest.mark.parametrize("is_bare", [False, True])
+def test_a_piece_that_is_seen_again_where_a_hand_has_laid_it_was_moved_by_it(is_bare: bool):
+    there, beside, lays, leaves = (0.56, 0.0), (0.6, 0.0), (0.6, 0.25), (0.8, 0.2)
+    away = [(None, lays)] * (3 if is_bare else 1)
+    film = [*[(there, beside)] * 3, *away, ((0.56, 0.25), leaves), ((0.56, 0.25), None), ((0.56, 0.25), None)]
+    laid = 1.5 + len(away) / 2
+
+    assert acts(film) == [(True, 1.0), (False, laid)]
