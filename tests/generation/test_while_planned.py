@@ -4,15 +4,12 @@ import asyncio
 from collections.abc import Callable
 from unittest.mock import patch
 
-import pytest
-
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gaze, Pointing, Reference, Speech, SpeechOption
 from engage_hri.schemas.body import EstimateBehaviors
 from engage_hri.schemas.fragments import FragmentOutcome, Inhibit, TurnFragment
 from engage_hri.schemas.messages import Message
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.generation import pipeline
 from tests.generation import partners as partners_module
 from tests.generation.partners import TABLE, Partners, stage
 
@@ -27,11 +24,6 @@ def refers(*targets: str) -> TurnFragment:
         for number, target in enumerate(targets)
     )
     return TurnFragment(id="show", behaviors=(Speech(id="s", text="Take"), *references))
-
-
-@pytest.fixture(autouse=True)
-def a_pause_at_each_step(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pipeline, "SLICE", 1)
 
 
 class Interruption:
