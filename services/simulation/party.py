@@ -25,8 +25,18 @@ from engage_hri.services.client.people.actions import WORD, speaking_time
 from engage_hri.services.reports.ongoing_actions import ActionEvent
 from engage_hri.services.simulation.chance import Chance
 from engage_hri.services.simulation.company import Company
-from engage_hri.services.simulation.human import AWAY, Act, Human, LookAt, Pause, Start, Stop
-from engage_hri.services.simulation.speech import HeardSpeech, Hearing, speech
+from engage_hri.services.simulation.human import (
+    AWAY,
+    Act,
+    HeardSpeech,
+    Hearing,
+    Human,
+    LookAt,
+    Pause,
+    Start,
+    Stop,
+    speech,
+)
 
 # -- habits -------------------------------------------------------------------------------------------------------
 

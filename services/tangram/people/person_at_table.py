@@ -17,6 +17,7 @@ from engage_hri.services.client.people.actions import PersonActions
 from engage_hri.services.simulation.human import (
     FACE,
     Act,
+    Ears,
     Grab,
     Human,
     Lay,
@@ -24,12 +25,12 @@ from engage_hri.services.simulation.human import (
     LookAt,
     Pause,
     Sit,
+    SpokenWords,
     Start,
     Stop,
     Understood,
     Withdraw,
 )
-from engage_hri.services.simulation.speech import Ears, SpokenWords
 from engage_hri.services.tangram.people.table import Table
 
 STILL = math.radians(0.3)

@@ -26,7 +26,10 @@ from engage_hri.services.simulation.chance import Chance, Delays
 from engage_hri.services.simulation.human import (
     FACE,
     TABLE,
+    THINKING,
     Act,
+    HeardSpeech,
+    Hearing,
     Human,
     Lay,
     Leave,
@@ -36,9 +39,9 @@ from engage_hri.services.simulation.human import (
     Start,
     Stop,
     Withdraw,
+    speech,
 )
 from engage_hri.services.simulation.listening import COMES, GOES, moves
-from engage_hri.services.simulation.speech import THINKING, HeardSpeech, Hearing, speech
 from engage_hri.services.tangram.table import TangramTable
 
 # -- habits -------------------------------------------------------------------------------------------------------
