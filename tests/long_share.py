@@ -109,9 +109,6 @@ LONG_TESTS = {
     "recording/test_analyse.py": {
         "test_the_numbers_of_a_recording_are_those_of_the_live_run": "a whole task, by chance",
     },
-    "recording/test_replay.py": {
-        "test_a_whole_task_comes_again_message_for_message": "a whole task; the others of the file have the rules",
-    },
     "requests/test_requests.py": {
         "test_a_desk_forgets_the_oldest_ended_requests_of_who_sends_many_and_no_live_one": "thousands of requests",
         "test_ten_thousand_requests_at_once_come_as_the_server_keeps_up_each_once_and_in_order": "so many",

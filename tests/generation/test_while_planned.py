@@ -1,7 +1,8 @@
 """What happens while a fragment is planned: an inhibition, a cancellation, a question that takes its time."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
+from typing import Any
 from unittest.mock import patch
 
 from engage_hri.schemas import keys
@@ -27,20 +28,21 @@ def refers(*targets: str) -> TurnFragment:
 
 
 class Interruption:
-    """Something that happens as the body answers the question about what comes after the first reference."""
+    """Something that happens while the body takes its time over what comes after the first reference."""
 
     def __init__(self) -> None:
         self.happens: Callable[[], object] = lambda: None
         self.questions = 0
 
-    def estimates(self, *arguments: object, **named: object) -> Callable[[Message], Message]:
+    def estimates(self, *arguments: object, **named: object) -> Callable[[Message], Coroutine[Any, Any, Message]]:
         answer = ORIGINAL(*arguments, **named)  # type: ignore[arg-type]
 
-        def told(question: Message) -> Message:
+        async def told(question: Message) -> Message:
             assert isinstance(question, EstimateBehaviors)
             self.questions += 1
             if self.questions == 2:
                 self.happens()
+                await asyncio.sleep(0.05)
             made: Message = answer(question)
             return made
 
