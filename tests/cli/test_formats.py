@@ -33,7 +33,7 @@ def test_a_format_is_written_as_utf8_on_a_stream_of_any_encoding(monkeypatch: py
 @pytest.mark.parametrize("encoding", ENCODINGS[:2])
 @pytest.mark.parametrize(
     "command",
-    [("bml",), ("plan", "--format", "json")],
+    [("bml",), ("plan", "--format", "json"), ("plan", "--format", "pnml")],
 )
 def test_commands_write_formats_as_utf8(tmp_path: Path, encoding: str, command: tuple[str, ...]) -> None:
     done = subprocess.run(

@@ -50,13 +50,14 @@ IN_BML_1_0 = """<bml id="b" xmlns="http://www.bml-initiative.org/bml/bml-1.0">
 def test_a_plan_names_points_as_its_block_does_and_each_once(engage: Engage, tmp_path: Path) -> None:
     path = tmp_path / "b.xml"
     path.write_text(IN_BML_1_0)
-    text = engage("plan", path).out
+    text, drawn = engage("plan", path).out, engage("plan", "--format", "dot", path).out
     document = json.loads(engage("plan", "--format", "json", path).out)
 
     assert "  look:ready = smile:attackPeak" in text
-    assert "_start" not in text
-    assert "look:stroke" not in text
-    assert "nod:stroke:2" in text
+    for told in (text, drawn):
+        assert "_start" not in told
+        assert "look:stroke" not in told
+        assert "nod:stroke:2" in told
     assert list(document["behaviors"]["look"]) == ["start", "ready", "relax", "end"]
     assert list(document["behaviors"]["smile"]) == ["start", "attackPeak", "relax", "end"]
     points = [point for each in document["transitions"] for point in each["points"]]
@@ -87,6 +88,10 @@ def test_of_a_block_that_names_another_it_is_told_how_to_try_the_two(engage: Eng
     assert planned.code == 0
     assert "no block is known as 'long'" in planned.err
     assert "`engage play --embedded --virtual-time --at 0,1 FIRST.xml tied.xml`" in planned.err
+
+
+def test_the_dot_is_a_graph(engage: Engage, block: Path) -> None:
+    assert engage("plan", "--format", "dot", block).out.startswith('digraph "hello" {')
 
 
 def test_durations_are_those_of_the_simulated_body_in_the_given_world(

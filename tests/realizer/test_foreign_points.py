@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import Head, Speech, Wait
 from engage_hri.schemas.blocks import Block, Fired
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.realizer.perform.net_stream import described, firings
+from engage_hri.services.realizer.export import described, firings
 from engage_hri.services.realizer.plan.known import BLOCK_END, Known, coming_with, is_behind
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block

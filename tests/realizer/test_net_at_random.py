@@ -6,10 +6,12 @@ import re
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Gaze, Pointing, Speech, Wait
-from engage_hri.services.realizer.export import as_json, as_text
+from engage_hri.services.realizer.export import as_dot, as_json, as_message, as_text, net_as_pnml
 from engage_hri.services.realizer.net.petri_net import (
+    Bound,
     PetriNet,
     Place,
     Transition,
@@ -18,10 +20,11 @@ from engage_hri.services.realizer.net.petri_net import (
     is_safe,
     order,
 )
-from engage_hri.services.realizer.perform.net_stream import as_message
+from engage_hri.services.realizer.points import Point
 from tests.random_cases import share_of
 from tests.realizer.firing import enabled, fire
 from tests.realizer.planning import at, plan, timed
+from tests.realizer.pnml_reader import read_pnml
 from tests.realizer.stage import after, before, block, together
 
 
@@ -109,7 +112,46 @@ def test_what_lives_and_what_is_safe_is_what_the_game_says(net: PetriNet, source
         assert not is_safe(net)
 
 
-# -- words ------------------------------------------------------------------------------------------
+SECONDS = st.sampled_from((0.0, 0.1 + 0.2, 1 / 3, 2.0))
+NAMES = st.sampled_from(("", "a", "s:m-1", "<é>&"))
+LINES = st.sampled_from(((), (3,), (3, 14)))
+
+
+@st.composite
+def any_nets(draw: st.DrawFn) -> PetriNet:
+    size = draw(st.integers(1, 4))
+    ends = st.integers(0, size - 1)
+    points = st.lists(st.tuples(NAMES, NAMES).map(lambda each: Point(*each)), max_size=2).map(tuple)
+    kinds = st.sampled_from(("phase", "delay", "order", "series", "handover", "idle"))
+    places = st.builds(Place, kinds, ends, ends, SECONDS, SECONDS, NAMES, LINES)
+    bounds = st.builds(Bound, kinds, ends, ends, SECONDS, st.one_of(st.none(), SECONDS), NAMES, LINES)
+    return PetriNet(
+        tuple(draw(st.lists(st.builds(Transition, NAMES, points), min_size=size, max_size=size))),
+        tuple(draw(st.lists(places, max_size=5))),
+        tuple(draw(st.lists(bounds, max_size=3))),
+    )
+
+
+@settings(max_examples=share_of(100), deadline=None)
+@given(any_nets(), NAMES)
+def test_any_net_comes_back_from_pnml_equal(net: PetriNet, name: str) -> None:
+    document = net_as_pnml(net, name)
+
+    assert read_pnml(document) == net == read_pnml(document.encode())
+    assert document.count("initialMarking") == 2 * sum(place.kind == "idle" for place in net.places)
+
+
+def test_what_another_version_or_tool_has_added_is_passed_over() -> None:
+    net = PetriNet((Transition("x", ()), Transition("y", ())), (Place("order", 0, 1, 2.0, 2.0), Place("idle", 1, 0)))
+    plain = replace(net, places=(Place("order", 0, 1), Place("idle", 1, 0)))
+    document = net_as_pnml(net)
+
+    assert read_pnml(document) == net
+    for old, new in (('tool="engage" version="1"', 'tool="engage" version="2"'), ('tool="engage"', 'tool="other"')):
+        assert read_pnml(document.replace(old, new)) == plain
+
+
+# -- words and drawings ------------------------------------------------------------------------------------------
 
 BEHAVIORS = (
     Gaze(id="g", target="can"),
@@ -166,6 +208,26 @@ def test_a_plan_in_words() -> None:
     assert "  t:start  no earlier than  s:end  (line 5)" in added
     assert "  p:start  at  bml:start +1.5 s" not in added
     assert lines[-1] == "ends when something takes its place, or with the block: g"
+
+
+def test_a_plan_as_a_drawing_has_every_place_bound_and_token() -> None:
+    made = plan(EXAMPLE)
+    drawing, net = as_dot(made), made.net
+    assert drawing.startswith('digraph "ex" {\n')
+    for number, transition in enumerate(net.transitions):
+        width = 2 if number in made.critical else 0.5
+        label = json.dumps(f"{transition.name}\n{made.schedule[number]:.2f} s", ensure_ascii=False)
+        assert f"t{number} [shape=box, style=filled, fillcolor=gray85, penwidth={width}, label={label}];" in drawing
+    for number, place in enumerate(net.places):
+        text = "●" if place.kind == "idle" else f"{place.lag:.3g}" if place.lag else ""
+        assert f'p{number} [shape=circle, label="{text}", tooltip="{place.kind}"];' in drawing
+        loose = ", constraint=false" if place.kind == "idle" else ""
+        arcs = f"t{place.source} -> p{number}; p{number} -> t{place.target} [style=solid{loose}];"
+        assert arcs in drawing
+    dashed = re.findall(r't(\d+) -> t(\d+) \[style=dashed, constraint=false, label="(.*)"\]', drawing)
+    bounds = [bound for bound in net.bounds if bound.kind != "phase"]
+    assert [(int(a), int(b), float(lag)) for a, b, lag in dashed] == [(it.source, it.target, it.lag) for it in bounds]
+    assert bounds
 
 
 def test_a_plan_as_data_and_as_a_message_says_the_same() -> None:

@@ -23,7 +23,7 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body import Estimate
 from engage_hri.schemas.faults import Fault
-from engage_hri.services.realizer.export import as_json, as_text
+from engage_hri.services.realizer.export import as_dot, as_json, as_text
 from engage_hri.services.realizer.net.petri_net import is_live
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import plan_block
@@ -266,10 +266,11 @@ def test_a_transition_that_is_not_enabled_does_not_fire() -> None:
         fire(net, net.initial, len(net.transitions) - 1)
 
 
-def test_a_plan_reads_as_text_and_json() -> None:
+def test_a_plan_reads_as_text_json_and_drawing() -> None:
     made = plan(block((GAZE, POINT), together("g:stroke", "p:start")))
 
     assert "0.500 s  g:stroke = p:start" in as_text(made)
     document = json.loads(as_json(made))
     assert document["behaviors"]["p"]["start"] == 0.5
     assert sum(place["tokens"] for place in document["places"]) == 1
+    assert as_dot(made).count("shape=box") == len(made.net.transitions)

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import typer
 
 from engage_hri.schemas.blocks import Block
-from engage_hri.schemas.faults import Fault
+from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.world import World
 from engage_hri.services.commandline.embedding import in_memory
 from engage_hri.services.commandline.shell import roster
@@ -33,7 +33,7 @@ class Options(Embodied):
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="A turn fragment or a BML block (XML or JSON).", show_default=False)
     ]
-    format: Annotated[Literal["text", "json"], typer.Option(help="How to print the net.")] = "text"
+    format: Annotated[Literal["text", "json", "dot", "pnml"], typer.Option(help="How to print the net.")] = "text"
     why: Annotated[
         bool, typer.Option("--why", help="Why each reference is made as it is: all gestures with all phrases.")
     ] = False
@@ -42,24 +42,26 @@ class Options(Embodied):
 
 
 def main(options: Options) -> int:
-    from engage_hri.services.realizer.export import as_json
+    from engage_hri.services.realizer import export
     from engage_hri.services.realizer.report import nothing_is_left
 
     config = options.load()
     source = read_source(options.file)
     around = read_world(options.world)
     if options.why:
+        if options.format not in ("text", "json"):
+            raise InputRefused(Fault(reason="prints text or json", where="--why", advice="leave out --format"))
         with source.naming_file():
             warnings = show_references(source, around, config, is_json=options.format == "json")
         if options.strict and warnings:
             raise strict_refusal(warnings)
         return DONE
-    written = as_json if options.format == "json" else _as_text
+    writers = {"text": _as_text, "json": export.as_json, "dot": export.as_dot, "pnml": export.as_pnml}
     texts, warnings, code = [], 0, DONE
     with source.naming_file():
         for plan in generated(source.things, around, config, str(source.path)):
             planned = run_virtual(rehearsed(plan.block, around, config))
-            texts.append(written(planned))
+            texts.append(writers[options.format](planned))
             for warning in plan.warnings:
                 warnings += 1
                 print(f"warning: {warning}", file=sys.stderr)
@@ -84,13 +86,12 @@ def main(options: Options) -> int:
 def _as_text(plan: Plan) -> str:
     from engage_hri.services.commandline.talk.net_drawing import drawing, legend
     from engage_hri.services.console.nets import in_view
-    from engage_hri.services.realizer.export import as_text
-    from engage_hri.services.realizer.perform.net_stream import as_message
+    from engage_hri.services.realizer import export
 
-    net = in_view(as_message(plan))
+    net = in_view(export.as_message(plan))
     assert net is not None
     width = Terminal().width
-    return "\n".join((as_text(plan), *drawing(net, width, HIGHEST), legend(net)))
+    return "\n".join((export.as_text(plan), *drawing(net, width, HIGHEST), legend(net)))
 
 
 async def rehearsed(block: Block, world: World, config: RobotConfig) -> Plan:

@@ -1,1 +1,1 @@
-"""The Petri net as data, and while it runs."""
+"""The Petri net as data, and as PNML."""

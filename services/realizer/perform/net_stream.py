@@ -5,30 +5,19 @@ Before that, if it waits for its turn, for which blocks.
 Messages of a stream may be dropped, and watchers may come late. So all of it is told again every two seconds.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.behaviors import Speech
-from engage_hri.schemas.blocks import (
-    Fired,
-    NetMarked,
-    NetPlace,
-    NetPlanned,
-    NetPoint,
-    NetSpeech,
-    NetTransition,
-    NetWaiting,
-)
-from engage_hri.schemas.units import Seconds, Stamp
+from engage_hri.schemas.blocks import NetMarked, NetWaiting
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.realizer.net.petri_net import Marking
+from engage_hri.services.realizer.export import described, firings
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.words import Spelling
-from engage_hri.services.realizer.points import FINISH, Point, as_told
 from engage_hri.services.realizer.together.live import Live
 from engage_hri.services.runtime.loop import Timer
 
@@ -36,53 +25,6 @@ EVERY: Seconds = 0.05
 """Least time between two messages about what has changed: nobody sees more of it."""
 AGAIN: Seconds = 2.0
 """Time between two messages that tell all."""
-
-
-def described(
-    plan: Plan, began: Stamp, marking: Marking, fired: Mapping[int, Seconds], spelling: Spelling
-) -> NetPlanned:
-    """The net of a plan with its tokens. began: when the block started. fired: transitions, seconds after that.
-
-    Points that have one name in the block's dialect are told once: in BML 1.0 a gaze's `stroke_start` is its `start`.
-    """
-    transitions = [
-        NetTransition(
-            points=tuple(dict.fromkeys(_point(point, spelling) for point in each.points or (FINISH,))),
-            time=time,
-        )
-        for each, time in zip(plan.net.transitions, plan.schedule, strict=True)
-    ]
-    places = [
-        NetPlace(kind=each.kind, source=each.source, target=each.target, lag=each.lag, behavior=each.behavior)
-        for each in plan.net.places
-    ]
-    return NetPlanned(
-        block=plan.block.id,
-        at=began,
-        transitions=tuple(transitions),
-        places=tuple(places),
-        marked=tuple(number for number, content in enumerate(marking) if content),
-        fired=firings(fired),
-        speeches=tuple(
-            NetSpeech(behavior=as_told(each.id), text=each.text)
-            for each in plan.block.behaviors
-            if isinstance(each, Speech)
-        ),
-    )
-
-
-def _point(point: Point, spelling: Spelling) -> NetPoint:
-    return NetPoint(behavior=as_told(point.behavior), sync=spelling.sync(point))
-
-
-def firings(fired: Mapping[int, Seconds]) -> tuple[Fired, ...]:
-    """Transitions with their times, in the order in which they fired."""
-    return tuple(Fired(transition=transition, time=time) for transition, time in fired.items())
-
-
-def as_message(plan: Plan) -> NetPlanned:
-    """The net as watchers are told of it, before the block has begun: with its initial marking."""
-    return described(plan, Stamp("", 0.0), plan.net.initial, {}, Spelling(plan.block))
 
 
 class NetStream(Observer):
