@@ -37,6 +37,7 @@ SHELLS = {
     "services/perception/hearing/speeches.py",  # publishes voices and words, waits for the last ones
     "services/perception/hearing/listening.py",  # runs the process of a recognizer
     "services/perception/hearing/microphone.py",  # plays a file, or runs the program that records
+    "services/recording/replay.py",  # says what was said
     "services/simulation/still.py",  # a world, published once, and what its people do
     "services/tangram/collaboration/host.py",  # asks people who talk
     "services/door/operations.py",  # calls of the client

@@ -54,6 +54,8 @@ FAMILIES: dict[str, dict[str, str]] = {
         "simulate": "Play many sessions in virtual time, and compare the conditions of the study. Exit 3 if one "
         "did not finish.",
         "record": "Record all that a robot says on its bus into a file (MCAP), until Ctrl-C.",
+        "replay": "Play a recording on a bus, at any speed, to and fro. Exit 75 if a live robot of its name is "
+        "there.",
         "export": "Turn a recording into annotations (ELAN, CSV), lines, or the settings of its services.",
         "analyse": "Make the tables of a study of recordings of people, or recognize them once more (--again).",
         "session": "",

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.services.recording.reading import Recording
+from engage_hri.services.recording.reading import REPAIRED, Recording
 from engage_hri.services.recording.writing import Sealed, Writer
 
 try:
@@ -24,6 +24,8 @@ FULL_CHUNK = 1024 * 1024
 """Bytes, before compression, from which on a chunk goes to the disk at once."""
 WAITING = 32 * 1024 * 1024
 """Bytes of chunks that may wait for room on the disk."""
+MOST_LACKS = 10
+"""Damaged places that the note in a repaired copy tells one by one."""
 PIECE = 2**20
 """Bytes that are copied at once."""
 Tell = Callable[[str], None]
@@ -171,6 +173,23 @@ def read(path: Path) -> Recording:
     except OSError as error:
         raise InputRefused(Fault(reason=f"cannot read: {error.strerror}", where=str(path))) from error
     return Recording(data, str(path))  # type: ignore[arg-type]  # a map is read like bytes
+
+
+def repair(recording: Recording, copy: Path, tell: Tell) -> bool:
+    """Copy all that can be read of a recording into a new file, with a note of what the old one lacks.
+
+    Returns False if the copy is not whole. Raises InputRefused: it cannot be written, or there is such a file.
+    """
+    lacks, notes = recording.lacks, dict(recording.notes)
+    if lacks:
+        more = [f"and {len(lacks) - MOST_LACKS} more such places"] if len(lacks) > MOST_LACKS else []
+        notes[REPAIRED] = {"found": "; ".join([*lacks[:MOST_LACKS], *more])}
+    file = RecordingFile(copy, recording.facts, tell)
+    for number in range(len(recording)):
+        file.writer.add(*recording.stored(number))
+        if file.writer.size > FULL_CHUNK:
+            file.write()
+    return file.close(notes)
 
 
 def _opened(path: Path, *, overwrite: bool) -> int:

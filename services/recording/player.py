@@ -1,6 +1,6 @@
-"""Player of a recording, pure: time is an argument. It needs no bus, and serves a window.
+"""Player of a recording, pure: time is an argument. It needs no bus, and serves one, or a window.
 
-    player = Playback(recording, now)           # it plays from the beginning
+    player = Player(recording, now)             # it plays from the beginning
     messages = player.advance(now)              # those that are due since last time, oldest first
     messages = player.seek(12.5, now)           # the states as they were then, and who was there
     player.pause(now), player.play(now, speed=2.0), player.deadline
@@ -86,10 +86,13 @@ class Timeline:
 class Playback:
     """A place in a recording that moves. at: its time. speed: 1.0 as it was. is_over: the end is reached."""
 
-    def __init__(self, recording: Recording, now: Seconds) -> None:
+    def __init__(
+        self, recording: Recording, now: Seconds, *, speed: float = 1.0, until: Seconds | None = None
+    ) -> None:
+        """until: time at which it ends."""
         self.timeline = Timeline(recording)
-        self.end = self.timeline.end
-        self.speed = 1.0
+        self.end = self.timeline.end if until is None else min(until, self.timeline.end)
+        self.speed = speed
         self.is_paused = False
         self._at: Seconds = 0.0
         self._since = now
@@ -129,6 +132,10 @@ class Playback:
         self._at, self._since = min(max(0.0, at), self.end), now
         self._next = self.timeline.before(self._at)
         return self.timeline.standing(self._next)
+
+    def finish(self) -> None:
+        """Take the end for reached."""
+        self.end, self._next = -1.0, max(self._next, self.timeline.until(self.end))
 
     def pause(self, now: Seconds) -> None:
         self._at, self._since, self.is_paused = self.at(now), now, True

@@ -67,6 +67,8 @@ LARGEST_CHUNK = 64 * 1024 * 1024
 CHUNKS_KEPT = 16
 """Number of chunks that are kept decompressed."""
 BILLION = 1_000_000_000
+REPAIRED = "engage-repaired"
+"""Name of the note in a copy that was made of a damaged recording: what that lacked, in words."""
 
 
 class Damaged(Struct, frozen=True):
@@ -89,15 +91,16 @@ class Stored(NamedTuple):
 class Recording:
     """A recording. Its messages are numbered from 0, in the order in which they came to the recorder.
 
-    facts: what the recorder wrote of itself at the beginning (docs/recordings.md). has_all_data: the data ends where
-    it says so. is_whole: and the index behind it is as it was written. lost_bytes: bytes at the end that were not
-    read. damaged: everything else that is not as a recorder wrote it.
+    facts: what the recorder wrote of itself at the beginning (docs/recordings.md). notes: what it wrote later, by
+    name. has_all_data: the data ends where it says so. is_whole: and the index behind it is as it was written.
+    lost_bytes: bytes at the end that were not read. damaged: everything else that is not as a recorder wrote it.
     """
 
     def __init__(self, data: bytes, name: str = "recording") -> None:
         """data: the file; it may be a memory map. Raises InputRefused: it is none of ours, or nothing is in it."""
         self.name = name
         self.facts: dict[str, str] = {}
+        self.notes: dict[str, dict[str, str]] = {}
         self.is_whole = self.has_all_data = False
         self.lost_bytes = 0
         self.damaged: list[Damaged] = []
@@ -157,6 +160,19 @@ class Recording:
     def duration(self) -> Seconds:
         """Time of the last message."""
         return self.time(len(self) - 1) if len(self) else 0.0
+
+    @property
+    def repaired(self) -> str:
+        """Words about what the recording lacked of which this is a copy; empty: it is none."""
+        return self.notes.get(REPAIRED, {}).get("found", "")
+
+    @property
+    def lacks(self) -> list[str]:
+        """Words about what this recording lacks, and the one of which it is a copy; empty: nothing."""
+        found = [self.repaired] if self.repaired else []
+        if not self.has_all_data:
+            found.append(f"what came after {self.duration:.2f} s is missing")
+        return found + [f"damaged at byte {each.offset}: {each.reason}" for each in self.damaged]
 
     # -- messages -----------------------------------------------------------------------------------------------
 
@@ -254,7 +270,9 @@ class Recording:
             self._take_chunk(at, end)
         elif opcode == Opcode.METADATA:
             told = Metadata.read(_stream(self._data[at + _HEAD.size : end]))
-            if told.name == PROFILE and not self.facts:
+            if told.name != PROFILE:
+                self.notes[told.name] = told.metadata
+            elif not self.facts:
                 self.facts = told.metadata
         elif opcode == Opcode.DATA_END:
             checksum = DataEnd.read(_stream(self._data[at + _HEAD.size : end])).data_section_crc

@@ -62,7 +62,7 @@ async def test_who_records_is_told_at_once_of_a_disk_without_room_and_by_the_exi
 
     assert code == 3
     assert "for want of room on the disk" in said
-    assert "its end is missing" in said
+    assert "engage record --repair" in said
 
 
 async def test_a_recording_that_was_removed_with_its_folder_is_not_said_to_be_there(tmp_path: Path) -> None:

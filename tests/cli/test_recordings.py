@@ -1,4 +1,4 @@
-"""`engage record`, `export` and `analyse` as people type them; one of them as a process."""
+"""`engage record`, `replay`, `export` and `analyse` as people type them; two of them as processes."""
 
 import asyncio
 import json
@@ -31,7 +31,7 @@ def _run(capsys: pytest.CaptureFixture[str]) -> Engage:
 
 
 @pytest.mark.real_time
-async def test_what_is_told_on_a_bus_is_in_the_recording(tmp_path: Path) -> None:
+async def test_what_is_recorded_comes_again_on_another_bus(tmp_path: Path) -> None:
     path, endpoint = tmp_path / "a.mcap", free_endpoint()
     async with await open_hub("told", listen=[endpoint]) as hub:
         there = hub.join("there")
@@ -53,6 +53,27 @@ async def test_what_is_told_on_a_bus_is_in_the_recording(tmp_path: Path) -> None
     recording = read(path)
     assert recording.is_whole
     assert (recording.robot, recording.facts["participant"]) == ("told", "p1")
+
+    elsewhere = free_endpoint()
+    async with await open_hub("told", listen=[elsewhere]) as hub:
+        bus = hub.join("listener")
+        with bus.subscribe(keys.ANY_FAULT, keys.HEAD_OWNER, keys.ANY_ALIVE) as inbox:
+            replay = await start("replay", path, "--connect", elsewhere, "--speed", "10")
+            found = []
+            while len(found) < 51:
+                received = await inbox.next(bus.now() + PATIENCE)
+                assert received is not None, f"only {len(found)} have come"
+                if isinstance(received.message, Fault):
+                    found.append((received.source, received.message.reason))
+            assert found == [("there", "state"), *(("there", str(number)) for number in range(50))]
+            assert await asyncio.wait_for(replay.wait(), PATIENCE) == 0
+
+        control = hub.join("control")
+        control.declare_alive()
+        refused = await start("replay", path, "--connect", elsewhere)
+        _, said = await asyncio.wait_for(refused.communicate(), PATIENCE)
+        assert refused.returncode == 75
+        assert b"has this on the bus already" in said
 
 
 def _recorded(path: Path, count: int) -> bool:
@@ -78,6 +99,13 @@ def test_a_folder_that_is_read_only_and_a_file_that_is_there_are_refused(run: En
     assert (tmp_path / "a.mcap").read_text() == "mine"
 
 
+def test_a_replay_from_behind_the_end_is_refused_with_the_length(run: Engage, tmp_path: Path) -> None:
+    path = saved(tmp_path / "a.mcap", told())
+    result = run("replay", path, "--at", read(path).duration + 0.1)
+    assert result.code == 2
+    assert f"the recording ends after {read(path).duration:.2f} s" in result.err
+
+
 def test_without_the_library_its_extra_is_named(run: Engage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mcap.records", None)
 
@@ -87,14 +115,22 @@ def test_without_the_library_its_extra_is_named(run: Engage, tmp_path: Path, mon
     assert "[record]'" in result.err
 
 
-def test_a_cut_file_is_read_and_that_is_said(run: Engage, tmp_path: Path) -> None:
-    path = tmp_path / "a.mcap"
+def test_a_cut_file_is_read_and_repaired_and_that_is_said(run: Engage, tmp_path: Path) -> None:
+    path, copy = tmp_path / "a.mcap", tmp_path / "a.repaired.mcap"
     path.write_bytes(bytes_of(told(), is_whole=False)[:-80])
 
     shown = run("export", path, "--csv")
+    repaired = run("record", path, "--repair")
+    again = run("record", path, "--repair")
+    copied = run("record", copy, "--repair")
 
     assert shown.code == 0
     assert "its end is missing or damaged; 49 messages until 7.00 s are whole" in shown.err
+    assert (repaired.code, copied.code) == (0, 0)
+    assert repaired.out == f"{copy}: 49 messages\n{copy}: what came after 7.00 s is missing\n"
+    assert copied.out == f"{copy}: nothing to repair\n"
+    assert (again.code, "there is such a file" in again.err) == (2, True)
+    assert read(copy).is_whole
 
 
 def test_a_damaged_index_is_told_from_a_missing_end(run: Engage, tmp_path: Path) -> None:
@@ -102,10 +138,12 @@ def test_a_damaged_index_is_told_from_a_missing_end(run: Engage, tmp_path: Path)
     path.write_bytes(data[:-30] + bytes([data[-30] ^ 1]) + data[-29:])
 
     shown = run("export", path, "--csv")
+    repaired = run("record", path, "--repair")
 
     assert shown.err.splitlines()[0].endswith(
         "the index at its end is damaged, or more stands behind it; its data is there, 50 messages"
     )
+    assert repaired.out == f"{tmp_path / 'a.repaired.mcap'}: 50 messages\n"
 
 
 def test_of_a_recording_behind_another_only_that_is_said(run: Engage, tmp_path: Path) -> None:

@@ -6,17 +6,22 @@ code 2.
 """
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from pathlib import Path
 from random import Random
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 
+from engage_hri.schemas import keys
 from engage_hri.services import commandline
+from engage_hri.services.bus.memory import MemoryHub
+from engage_hri.services.bus.subscription import Tap
 from engage_hri.services.commandline.app import COMMANDS
 from engage_hri.services.commandline.look import console
+from engage_hri.services.commandline.study import replay
 from engage_hri.services.console.web.played import PlayedPicture
+from engage_hri.services.recording.disk import read
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.cli.command import Engage, engage
@@ -69,8 +74,27 @@ class Commands:
     def __init__(self, run: Engage, patched: pytest.MonkeyPatch) -> None:
         self._run = run
         self._seen: list[object] = []
+        self._taps: list[Tap] = []
+        patched.setattr(replay, "run_until_signal", lambda main: run_virtual(self._heard(main)))
         patched.setattr(console, "run_until_signal", run_virtual)
+        patched.setattr(replay.Options, "open", self._hub)
         patched.setattr(console, "_play", self._look)
+
+    async def _hub(self, *_: object) -> MemoryHub:
+        hub = MemoryHub("robot")
+        self._taps.append(hub.join("ear").tap(keys.EVERYTHING))
+        return hub
+
+    async def _heard(self, main: Coroutine[Any, Any, int]) -> int:
+        """Note what is said on the bus, but for the lives of those who say it, which are new each time."""
+        code = await main
+        for tap in self._taps:
+            while len(tap):
+                one = await tap.next()
+                if one is not None and not keys.is_presence(one.key):
+                    self._seen.append((one.key, one.payload))
+        self._taps.clear()
+        return code
 
     async def _look(self, _: object, recording: Recording) -> None:
         """Look at a recording in the window: some places in it, to and fro."""
@@ -98,12 +122,27 @@ class Commands:
     def again(self, path: Path) -> Made:
         return self._made("analyse", path, "--again")
 
+    def replay(self, path: Path) -> Made:
+        return self._made("replay", path, "--speed", 100, "--commands")
+
     def console(self, path: Path) -> Made:
         return self._made("console", "--recording", path)
 
+    def record(self, path: Path) -> Made:
+        """Repair it: the copy is whole, and has all that could be read."""
+        copy = path.with_suffix(".repaired.mcap")
+        copy.unlink(missing_ok=True)
+        made = self._made("record", path, "--repair")
+        if made.code == 0 and copy.exists():
+            repaired = read(copy)
+            assert (repaired.is_whole, repaired.damaged) == (True, [])
+            assert all_of(repaired) == all_of(read(path))
+            assert "nothing to repair" in self._run("record", copy, "--repair").out
+        return Made(made.code, [], made.err or str(made.things[0]))
+
 
 ALL: tuple[Damage, ...] = (_flipped, *DAMAGES, _spliced, _several, _no_recording)
-QUICK = ("export", "analyse", "again", "console")
+QUICK = ("export", "analyse", "again", "replay", "console", "record")
 
 
 @pytest.fixture
@@ -136,7 +175,7 @@ def check(
 def made_of(commands: Commands, names: Sequence[str], path: Path, data: bytes) -> dict[str, Made]:
     path.write_bytes(data)
     usual = {name: getattr(commands, name)(path) for name in names}
-    assert all(each.code == 0 and not each.err for each in usual.values()), usual
+    assert all(each.code == 0 and (name == "record" or not each.err) for name, each in usual.items()), usual
     return usual
 
 
@@ -148,7 +187,7 @@ def test_all_commands_that_open_recordings_are_tried() -> None:
     reads = {name for name, text in texts.items() if re.search(r"recording\.(reading|disk) import", text)}
     opens = {name for name, text in texts.items() if re.search(r"recording_file import .*\bopened\b", text)}
 
-    assert reads | opens == {"analyse", "console", "export"} <= {*COMMANDS}
+    assert reads | opens == {"analyse", "console", "export", "record", "replay"} <= {*COMMANDS}
     assert reads | opens <= {*QUICK}
 
 

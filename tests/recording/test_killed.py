@@ -12,7 +12,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.participants import PeerAlive
 from engage_hri.services.bus.zenoh.hub import open_hub
-from engage_hri.services.recording.disk import read
+from engage_hri.services.recording.disk import read, repair
 from engage_hri.services.recording.service import FLUSH
 from tests.bus.places import PATIENCE, free_endpoint
 
@@ -52,6 +52,9 @@ async def test_what_a_killed_recorder_took_before_its_last_write_is_in_the_file(
     assert numbers == [*range(len(numbers))]
     assert numbers
     assert mine[-1].at - mine[0].at >= FLUSH
+    repair(recording, tmp_path / "b.mcap", print)
+    assert read(tmp_path / "b.mcap").is_whole
+    assert len(read(tmp_path / "b.mcap")) == len(recording)
 
 
 async def _soon(loop: asyncio.AbstractEventLoop) -> None:

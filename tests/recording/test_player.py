@@ -83,8 +83,7 @@ def test_wherever_it_goes_it_gives_what_a_scan_gives(samples: list[Sample], ways
 
 @given(stories(), st.sampled_from([0.25, 1.0, 3.0, 7.0]))
 def test_from_deadline_to_deadline_each_message_comes_once_in_order(samples: list[Sample], speed: float) -> None:
-    player = Playback(recording(samples), 100.0)
-    player.play(100.0, speed)
+    player = Playback(recording(samples), 100.0, speed=speed)
     found: list[Sample] = []
     while (due := player.deadline) is not None:
         before = len(found)
@@ -110,6 +109,16 @@ def test_a_pause_stops_time_and_a_change_of_speed_keeps_the_place() -> None:
     assert player.at(63.0) == 5.5
     assert [one.at for one in player.advance(1000.0)] == [5.0, 6.0, 7.0, 8.0, 9.0]
     assert (player.at(1000.0), player.is_over) == (9.0, True)
+
+
+def test_it_ends_where_it_is_told_to() -> None:
+    samples = [sample(keys.fault("a"), Fault(reason=str(at)), float(at), number=at + 1) for at in range(10)]
+    player = Playback(recording(samples), 0.0, until=4.0)
+
+    assert [one.at for one in player.advance(100.0)] == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert player.is_over
+    assert player.seek(8.0, 100.0) == []
+    assert player.at(200.0) == 4.0
 
 
 def test_the_number_until_a_time_is_that_of_a_count() -> None:

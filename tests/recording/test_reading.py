@@ -15,7 +15,7 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.participants import PeerAlive
 from engage_hri.services.bus.interface import Sample
 from engage_hri.services.recording import reading
-from engage_hri.services.recording.disk import read
+from engage_hri.services.recording.disk import read, repair
 from engage_hri.services.recording.reading import Recording
 from tests.recording.files import FACTS, WALL, all_of, bytes_of, chunks_of, nanoseconds, records, sample, saved
 
@@ -40,6 +40,7 @@ def test_all_messages_come_back_as_they_came() -> None:
     assert all_of(recording) == told()
     assert (recording.is_whole, recording.lost_bytes, recording.damaged) == (True, 0, [])
     assert (recording.robot, recording.clock, recording.began, recording.wall) == ("robot", "loop", 0.0, WALL)
+    assert recording.notes == {"end": {"messages": "50", "lost": "0"}}
     assert recording.duration == 7.5
 
 
@@ -103,6 +104,33 @@ def test_a_whole_file_cut_off_in_its_end_has_all_messages() -> None:
 
         assert len(recording) == 50
         assert not recording.is_whole
+
+
+def test_a_repaired_copy_is_whole_for_everybody_and_the_file_stays_as_it_was(tmp_path: Path) -> None:
+    data = bytes_of(told(), is_whole=False)
+    begin, end = chunks_of(bytes_of(told()))[1]
+    damaged = data[: begin + 80] + bytes([data[begin + 80] ^ 0xFF]) + data[begin + 81 :]
+    for number, bad in enumerate((data, data[:-3], data[: end + 5], data[: begin + 9], damaged)):
+        path = tmp_path / f"{number}.mcap"
+        path.write_bytes(bad)
+
+        copy = repaired(path)
+
+        assert (path.read_bytes(), copy.is_whole, copy.damaged) == (bad, True, [])
+        assert all_of(copy) == all_of(read(path))
+        with Path(copy.name).open("rb") as file:
+            reader = make_reader(file, validate_crcs=True)
+            assert len(_of_bus(reader)) == len(copy)
+            assert len(_of_bus(reader, starting_at=nanoseconds(1.0))) == len([b for b in all_of(copy) if b.at >= 1])
+            statistics = reader.get_summary().statistics
+            assert statistics.message_count == len(list(reader.iter_messages()))
+
+
+def repaired(path: Path) -> Recording:
+    """A repaired copy, which lies beside the file."""
+    copy = path.with_suffix(".repaired.mcap")
+    assert repair(read(path), copy, print)
+    return read(copy)
 
 
 def _of_bus(reader: Any, **bounds: int) -> list[Any]:
@@ -175,6 +203,55 @@ def test_what_is_no_recording_is_refused(tmp_path: Path, data: bytes, reason: st
 
     with pytest.raises(InputRefused, match=reason):
         read(path)
+
+
+@pytest.mark.parametrize("cut", [80, 700])
+def test_a_repaired_recording_tells_for_ever_what_was_missing(tmp_path: Path, cut: int) -> None:
+    path, data = tmp_path / "a.mcap", bytes_of(told(), is_whole=False)
+    path.write_bytes(data[:-cut])
+    before = read(path)
+
+    after = repaired(path)
+
+    assert (after.is_whole, after.damaged, all_of(after)) == (True, [], all_of(before))
+    assert after.repaired == f"what came after {before.duration:.2f} s is missing"
+    with Path(after.name).open("rb") as file:
+        assert [each.name for each in make_reader(file).iter_metadata()] == ["engage", "engage-repaired"]
+
+    copy = Path(after.name)
+    copy.write_bytes(copy.read_bytes()[:-10])  # its index is damaged: another repair forgets nothing
+    assert repaired(copy).repaired == after.repaired
+
+
+def test_a_copy_of_a_recording_without_a_message_has_a_note_of_it(tmp_path: Path) -> None:
+    path, whole = tmp_path / "a.mcap", bytes_of(told())
+    (begin, _), (end, _) = chunks_of(whole)[1:3]
+    path.write_bytes(whole[:begin] + whole[end:])
+
+    (damage,) = read(path).damaged
+
+    assert damage.reason in repaired(path).repaired
+
+
+def test_a_copy_of_a_recording_with_all_its_data_has_no_note(tmp_path: Path) -> None:
+    path, data = tmp_path / "a.mcap", bytes_of(told())
+    path.write_bytes(data[:-10])
+
+    assert (all_of(repaired(path)), repaired_notes(path)) == (told(), ["engage", "end"])
+
+
+def repaired_notes(path: Path) -> list[str]:
+    with path.with_suffix(".repaired.mcap").open("rb") as file:
+        return [each.name for each in make_reader(file).iter_metadata()]
+
+
+def test_a_copy_never_replaces_a_file(tmp_path: Path) -> None:
+    path = saved(tmp_path / "a.mcap", told())
+
+    with pytest.raises(InputRefused, match="there is such a file"):
+        repair(read(path), path, print)
+
+    assert read(path).is_whole
 
 
 def test_a_recording_of_nothing_opens(tmp_path: Path) -> None:

@@ -89,7 +89,7 @@ def test_a_file_of_many_chunks_takes_no_more_memory_than_one_of_few(tmp_path: Pa
     assert len(read(tmp_path / "a.mcap")) == 2100
 
 
-def test_a_full_disk_at_the_end_leaves_a_file_with_all_messages(
+def test_a_full_disk_at_the_end_leaves_a_file_that_can_be_repaired(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file, full = opened(tmp_path / "a.mcap"), FullDisk(monkeypatch)
@@ -109,6 +109,8 @@ def test_a_full_disk_at_the_end_leaves_a_file_with_all_messages(
 
     assert (len(read(tmp_path / "a.mcap")), read(tmp_path / "a.mcap").is_whole) == (50, False)
     assert read(tmp_path / "a.mcap").lost_bytes == 0
+    disk.repair(read(tmp_path / "a.mcap"), tmp_path / "b.mcap", print)
+    assert (len(read(tmp_path / "b.mcap")), read(tmp_path / "b.mcap").is_whole) == (50, True)
 
 
 async def test_beyond_the_room_for_channels_messages_are_kept_whole_and_those_that_are_known_stay_in_use(

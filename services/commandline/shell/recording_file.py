@@ -43,6 +43,8 @@ def opened(path: Path) -> "Recording":
             f"{path}: its end is missing or damaged; {len(recording)} messages until {recording.duration:.2f} s"
             f" are whole{behind}"
         )
+    if recording.repaired:
+        complain(f"{path}: it is a copy of a recording that lacked something: {recording.repaired}")
     for place in recording.damaged:
         complain(f"{path}: damaged at byte {place.offset}: {place.reason}")
     if recording.losses.total:
@@ -82,4 +84,6 @@ def _report(recorder: "Recorder", file: "RecordingFile", is_whole: bool) -> None
     if lost.total:
         complain(f"{file.path}: {lost.total} messages are missing, {lost.disk} of them for want of room on the disk")
     if not is_whole:
-        complain(f"{file.path}: its end is missing; Engage reads it all the same, `mcap recover` makes a whole copy")
+        complain(
+            f"{file.path}: it has no end; `engage record --repair` makes a copy that has one, once there is room"
+        )

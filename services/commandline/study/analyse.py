@@ -212,6 +212,8 @@ def _doubts(recording: Recording, told: Sequence[Told], times: RecordingTimes) -
     before = sum(not counts for counts in known.values())
     if not recording.has_all_data:
         yield f"its end is missing or damaged: the numbers are of the first {recording.duration:.0f} s"
+    if recording.repaired:
+        yield f"it is a copy of a recording that lacked something: {recording.repaired}"
     if recording.losses.total:
         yield f"{recording.losses.total} messages are missing"
     if recording.losses.still:

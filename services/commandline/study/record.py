@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from engage_hri.schemas import access, keys
+from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.services.commandline.shell.options import Connected
 from engage_hri.services.commandline.shell.outputs import complain
 from engage_hri.services.commandline.shell.process import DONE, FAILED, run_until_signal, unique_name
@@ -36,14 +37,36 @@ class Options(Connected):
         float | None, typer.Option(metavar="S", min=0, help="End by itself after so long.", show_default=False)
     ] = None
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file if there is one.")] = False
+    repair: Annotated[
+        bool, typer.Option("--repair", help="Copy all that can be read of a damaged FILE into a whole one beside it.")
+    ] = False
 
 
 def main(options: Options) -> int:
     needed()
+    if options.repair:
+        return _repair(options.file)
     config = options.load()
     os.nice(GIVES_WAY)
     path = options.file or Path(f"{config.bus.robot}-{time.strftime('%Y%m%d-%H%M%S')}.mcap")
     return run_until_signal(_record(options, config, path))
+
+
+def _repair(path: Path | None) -> int:
+    from engage_hri.services.recording.disk import read, repair
+
+    if path is None:
+        raise InputRefused(Fault(reason="needs a FILE", where="--repair"))
+    recording = read(path)
+    if recording.is_whole and not recording.damaged:
+        print(f"{path}: nothing to repair")
+        return DONE
+    copy = path.with_suffix(".repaired.mcap")
+    is_whole = repair(recording, copy, complain)
+    print(f"{copy}: {len(recording)} messages")
+    for lack in recording.lacks:
+        print(f"{copy}: {lack}")
+    return DONE if is_whole else FAILED
 
 
 async def _record(options: Options, config: RobotConfig, path: Path) -> int:
