@@ -49,8 +49,7 @@ from engage_hri.services.generation.references.motions import (
     onward_told,
 )
 from engage_hri.services.generation.references.pairs import ReferenceScene, considered, minimum_of, shown
-from engage_hri.services.generation.references.policy import choose
-from engage_hri.services.generation.references.sequence import HeadAndArms, Movements
+from engage_hri.services.generation.references.policy import HeadAndArms, Movements, choose
 from engage_hri.services.generation.service import generate
 from engage_hri.services.requests.ends import RequestDesk, Requester
 from engage_hri.services.runtime.service import running

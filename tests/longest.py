@@ -15,7 +15,7 @@ LONGEST = (
     "realizer/test_exact_plan.py", "lab/test_time.py", "cli/test_demo.py", "access/test_attacks.py",
     "cli/test_second_ctrl_c.py", "cli/test_simulate.py", "lab/test_talks_on.py",
     "access/test_table.py", "test_wheel.py", "tangram/people/test_stochastic_task.py", "lab/test_reach.py",
-    "control/mujoco/test_faults.py", "lab/test_deploy.py", "recording/test_replay.py", "cli/test_watched.py",
+    "control/mujoco/test_faults.py", "lab/test_deploy.py", "cli/test_watched.py",
     "realizer/test_slices.py", "cli/test_in_one.py", "control/test_composed.py",
     "generation/test_same_choices.py", "control/test_slowed_over_table.py", "generation/test_talked_into.py",
     "generation/test_streaming.py", "control/test_postures.py", "generation/test_chosen_again.py",

@@ -2,12 +2,11 @@
 
 SHELLS = {
     "services/realizer/perform/performance.py",  # awaits bodies
-    "services/realizer/perform/recognition_link.py",  # asks recognition
     "services/control/serving/state_publisher.py",  # publishes what the body shows
     "services/control/serving/questions.py",  # answers what behaviors would take
     "services/control/bases/driver_guard.py",  # times the calls of drivers by the clock of the loop
     "services/realizer/report.py",  # publishes feedback
-    "services/realizer/perform/behavior_run.py",  # awaits and resolves sync points, awaits ends
+    "services/realizer/perform/behavior_run.py",  # awaits and resolves sync points, awaits ends, asks recognition
     "services/realizer/together/planning.py",  # asks the body, and asks it again
     "services/realizer/perform/net_stream.py",  # publishes the marking
     "services/realizer/perform/steering.py",  # holds, continues and stops

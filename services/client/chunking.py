@@ -18,9 +18,8 @@ from engage_hri.schemas.text import joined, word_count
 from engage_hri.schemas.tool import Part, Refer, Say
 from engage_hri.services.text.ear import heard
 from engage_hri.services.text.ends import ends, next_end
-from engage_hri.services.text.marks import Reader
+from engage_hri.services.text.marks import Ids, Piece, Reader, problems
 from engage_hri.services.text.patterns import PUNCTUATION, is_silent
-from engage_hri.services.text.pieces import Ids, Piece, problems
 
 Chunk = tuple[Part, ...]
 """Parts that are spoken without a pause."""

@@ -6,7 +6,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import COVERED_FOR, CoveredObjects, World
 from engage_hri.services.client.chunking import UNKNOWN
 from engage_hri.services.client.feeds import Feed
-from engage_hri.services.text.pieces import Ids
+from engage_hri.services.text.marks import Ids
 
 WORLD_PATIENCE: Seconds = 0.3
 """Time from the start of a turn for which a bracket waits for the world: it alone says what a reference is."""

@@ -41,7 +41,7 @@ from engage_hri.services.client.known_objects import KnownObjects
 from engage_hri.services.client.outcomes import outcome_of, texts, unreadable, unsaid
 from engage_hri.services.client.performing import PerformingRobot
 from engage_hri.services.requests.ends import Patience, Pending
-from engage_hri.services.text.pieces import Ids
+from engage_hri.services.text.marks import Ids
 
 Piece = str | Part
 """A bit of text, however short, in which `[id]` refers to an object; or a part by itself."""

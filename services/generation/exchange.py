@@ -87,9 +87,9 @@ class OwnSight(Struct, frozen=True, tag="own_sight"):
     unlinked_at: Seconds = NEVER
 
 
-Way = Generator[Question | str | None, Any, None]
-"""Way of a fragment: it yields a question to the body, the id of its block that there is to be news of, or None for a
-pause until the next step, in which others may go on. An end without an answer is raised in it."""
+Way = Generator[Question | str, Any, None]
+"""Way of a fragment: it yields a question to the body, or the id of its block that there is to be news of. An end
+without an answer is raised in it."""
 
 
 class Ways:
@@ -99,12 +99,7 @@ class Ways:
         self._tell = tell
         self._waiting: dict[str, Way] = {}
         """By the id of the question, or of the block, that there is to be news of."""
-        self._paused: list[Way] = []
         self._questions = 0
-
-    @property
-    def is_any_paused(self) -> bool:
-        return bool(self._paused)
 
     def begin(self, way: Way) -> None:
         self._go(way, None)
@@ -114,20 +109,12 @@ class Ways:
         if (way := self._waiting.pop(id, None)) is not None:
             self._go(way, answer)
 
-    def go_on(self) -> None:
-        """Let those go on that have paused."""
-        paused, self._paused = self._paused, []
-        for way in paused:
-            self._go(way, None)
-
     def _go(self, way: Way, answer: Message | NoAnswer | None) -> None:
         try:
             awaited = way.throw(answer.error) if isinstance(answer, NoAnswer) else way.send(answer)
         except StopIteration:
             return
-        if awaited is None:
-            self._paused.append(way)
-        elif isinstance(awaited, str):
+        if isinstance(awaited, str):
             self._waiting[awaited] = way
         else:
             self._questions += 1

@@ -31,7 +31,7 @@ from engage_hri.schemas.tool import in_call
 from engage_hri.schemas.world import World
 from engage_hri.services.generation.references.phrases import noun_in
 from engage_hri.services.text.ear import heard, is_spoken
-from engage_hri.services.text.pieces import Piece, problems
+from engage_hri.services.text.marks import Piece, problems
 
 Kind = Literal["entity", "object", "person"]
 """What may be named somewhere: whatever there is, the robot included; an object; a person."""

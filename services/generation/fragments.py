@@ -50,7 +50,7 @@ from engage_hri.services.generation.fragment_check import bearable, check_world,
 from engage_hri.services.generation.head.arbiter import Arbiter
 from engage_hri.services.generation.inhibitions import Leases, Permits
 from engage_hri.services.generation.performance import Ended, FragmentPerformance, GazesOfFragments
-from engage_hri.services.generation.pipeline import BodyLink, glance, planned_in_slices, planning, targets
+from engage_hri.services.generation.pipeline import BodyLink, glance, planning, targets
 from engage_hri.services.generation.references.phrases import NO_DISCOURSE, Discourse
 from engage_hri.services.generation.references.policy import Unreferable
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
@@ -72,7 +72,7 @@ _RECOGNITION_AWAY = ("away", "recognition")
 class Fragments:
     """All fragments that wait or are performed.
 
-    deadline: when to call `settle` at the latest. is_any_paused: true if `go_on` is to be called at once.
+    deadline: when to call `settle` at the latest.
     """
 
     def __init__(
@@ -240,10 +240,6 @@ class Fragments:
     # -- time -----------------------------------------------------------------------------------------------------
 
     @property
-    def is_any_paused(self) -> bool:
-        return self._ways.is_any_paused
-
-    @property
     def deadline(self) -> Seconds | None:
         due = (self._turns.deadline, self._outcomes.deadline, self._waits.earliest)
         return min((each for each in due if each is not None), default=None)
@@ -319,11 +315,6 @@ class Fragments:
         """Take news of a block, or the body's answer: the way that waits for it goes on."""
         self._now = now
         self._ways.answer(id, answer)
-
-    def go_on(self, now: Seconds) -> None:
-        """Let those go on that have paused."""
-        self._now = now
-        self._ways.go_on()
 
     def begin(self, now: Seconds) -> bool:
         """Begin what may begin now: the next fragment, another look at choices. False: there is nothing."""
@@ -404,9 +395,7 @@ class Fragments:
             heard, permitted, config = self._heard_in(turn), permits(), self._config
             reachable = without(motions, bars)
             try:
-                made = yield from planned_in_slices(
-                    planning(fragment, turn, world, body, reachable, permitted, config, before, heard)
-                )
+                made = yield from planning(fragment, turn, world, body, reachable, permitted, config, before, heard)
             except Unreferable:
                 if (freed := with_other_words(fragment, bars)) is None:
                     raise
@@ -459,10 +448,10 @@ class Fragments:
             permits, body = self._leases.permits(), self._body
             try:
                 motions = yield from body.motions(targets(fragment), permits.only_hand)
-                plan = planning(
+                plan = yield from planning(
                     fragment, turn, world, body.capabilities, without(motions, bars), permits, self._config
                 )
-                choices = (yield from planned_in_slices(plan)).choices
+                choices = plan.choices
             except Unreferable:
                 choices = ()
             if performance.is_over or performance.plan is None or performance.acts[-1] is not act:

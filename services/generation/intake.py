@@ -127,8 +127,6 @@ class GenerationIntake:
 
     @property
     def deadline(self) -> Seconds | None:
-        if self._fragments.is_any_paused:
-            return self._now
         reports = (self._reports.deadline, self._seen.deadline)
         due = (self._fragments.deadline, self._arbiter.deadline, self._patience.earliest, *reports)
         return min((each for each in due if each is not None), default=None)
@@ -137,7 +135,6 @@ class GenerationIntake:
         """Take the step that is due by now."""
         self._now = now
         with self._containing("what is due by now"):
-            self._fragments.go_on(now)
             self._settle(now)
         return self._take()
 
@@ -146,7 +143,6 @@ class GenerationIntake:
         self._now = now
         message = input.message
         with self._containing(f"{input.key or message.__class__.__name__} from {input.source or 'a stranger'}"):
-            self._fragments.go_on(now)
             if isinstance(message, GenerationBegan):
                 self._objects = CoveredObjects(message.covered_for)
                 self._tell_condition()

@@ -1,7 +1,8 @@
 """Plan of a fragment, pure: phrases are proposed, the body is asked, references are chosen, the block is emitted.
 
 The body is asked what it is able to, and what the motions that references need would cost. Whoever asks is a
-generator, which yields the question and is sent the answer; None is a pause, in which others may work.
+generator, which yields the question and is sent the answer. All between two questions is done in one go: to choose
+for ten references among a hundred objects takes 8 ms (decision 0262).
 """
 
 from collections.abc import Callable, Generator, Sequence
@@ -32,19 +33,16 @@ from engage_hri.services.generation.references.motions import (
 )
 from engage_hri.services.generation.references.pairs import ReferenceScene
 from engage_hri.services.generation.references.phrases import NO_DISCOURSE, Discourse, proposed
-from engage_hri.services.generation.references.policy import Choices, choice, weigh
-from engage_hri.services.generation.references.sequence import references_apart, unasked
+from engage_hri.services.generation.references.policy import Choices, choice, references_apart, unasked, weigh
 from engage_hri.services.generation.turns.continuation import NO_CONTINUATION, Continuation
 from engage_hri.services.generation.turns.plan import TurnPlan, in_vain
-from engage_hri.services.runtime.steps import SLICE
 
 WORDS_BETWEEN = 3.0
 """Words of plain speech between two references over which head and arm stay at the first one's target; after more
 they have gone home. Decision 0024; the number is ours."""
-ELEMENTS = 512
-"""Elements that the making of phrases counts for, and that of a block (see `runtime.steps`)."""
-Planning = Generator[int | tuple[EstimateItem, ...], Sequence[Estimate] | None, FragmentPlan]
-"""The making of a plan, in steps (see `runtime.steps`) and questions to the body, which are sent the answers."""
+T = TypeVar("T")
+Asking = Generator[Question, Any, T]
+"""Work that asks the body: it yields questions, and is sent the answers."""
 
 
 def references(fragment: TurnFragment) -> tuple[Reference, ...]:
@@ -73,7 +71,7 @@ def planning(
     config: GenerationConfig,
     before: Continuation = NO_CONTINUATION,
     discourse: Discourse = NO_DISCOURSE,
-) -> Planning:
+) -> Asking[FragmentPlan]:
     """Plan the block of a checked fragment. Raises RunFailed where a reference cannot be made at all.
 
     body, motions: needed for references only; at least those motions that start where the body is. before:
@@ -84,30 +82,30 @@ def planning(
     apart = references_apart(order, fragment.constraints, WORDS_BETWEEN)
     made = proposed([each for each in order if isinstance(each, Reference)], world, discourse)
     if made.references:
-        yield ELEMENTS
         motions = replace(motions, looks_last=config.profile == "figure-3.3")
         scene = _scene(world, body, permits, config)
-        tables = yield from weigh(made.references, scene, motions, config)
+        tables = weigh(made.references, scene, motions, config)
         while ways := unasked(tables, motions, config, apart):
-            answers = yield onward(ways, motions, permits.only_hand)
-            assert answers is not None, "a question is sent its answers"
+            answers = yield from _estimates(onward(ways, motions, permits.only_hand))
             motions = onward_told(ways, motions, answers)
-        chosen = yield from choice(tables, scene, motions, config, apart)
-        yield ELEMENTS
+        chosen = choice(tables, scene, motions, config, apart)
     emitted = Emission(fragment, turn, chosen.choices, config, permits, chosen.hands, before, apart).plan()
     return replace(emitted, warnings=(*in_vain(fragment, turn), *made.warnings, *chosen.warnings, *emitted.warnings))
 
 
-def planned(planning: Planning, answers: Callable[[tuple[EstimateItem, ...]], Sequence[Estimate]]) -> FragmentPlan:
-    """The plan, made in one go. answers: asks the body."""
-    told: Sequence[Estimate] | None = None
+def planned(
+    planning: Asking[FragmentPlan], answers: Callable[[tuple[EstimateItem, ...]], Sequence[Estimate]]
+) -> FragmentPlan:
+    """The plan, where the body answers at once. answers: asks it."""
+    told: Estimates | None = None
     while True:
         try:
             asked = planning.send(told)
         except StopIteration as end:
             plan: FragmentPlan = end.value
             return plan
-        told = None if isinstance(asked, int) else answers(asked)
+        assert isinstance(asked, EstimateBehaviors)
+        told = Estimates(items=tuple(answers(asked.items)))
 
 
 def _scene(world: World, body: Capabilities | None, permits: Permits, config: GenerationConfig) -> ReferenceScene:
@@ -120,10 +118,6 @@ def _scene(world: World, body: Capabilities | None, permits: Permits, config: Ge
         no_gaze=permits.no_gaze,
         no_point=permits.no_point,
     )
-
-
-T = TypeVar("T")
-Asking = Generator[Question | None, Any, T]
 
 
 class BodyLink:
@@ -150,26 +144,6 @@ class BodyLink:
         pose = pose_after(last, (yield from _estimates(last)))
         each = distinct(sequence)
         return from_here_told(each, (yield from _estimates(from_here(each, hand, pose, glance))), glance)
-
-
-def planned_in_slices(planning: Planning) -> Asking[FragmentPlan]:
-    """The plan that is being made, a slice at a time; its questions go to the body. Raises as they do."""
-    told: Sequence[Estimate] | None = None
-    done = SLICE  # to take in an answer was a slice of its own
-    while True:
-        if done >= SLICE:
-            done = 0
-            yield None
-        try:
-            asked = planning.send(told)
-        except StopIteration as end:
-            plan: FragmentPlan = end.value
-            return plan
-        told = None
-        if isinstance(asked, int):
-            done += asked
-        else:
-            told, done = (yield from _estimates(asked)), SLICE
 
 
 def _estimates(items: tuple[EstimateItem, ...]) -> Asking[tuple[Estimate, ...]]:

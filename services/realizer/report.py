@@ -30,8 +30,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.text import has_words
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.realizer.decide.decisions import Decisions
-from engage_hri.services.realizer.decide.lateness import Late
+from engage_hri.services.realizer.decide.decisions import Decisions, Late
 from engage_hri.services.realizer.plan.known import is_foreign
 from engage_hri.services.realizer.plan.plan import UNNOTICED, Broken, Plan
 from engage_hri.services.realizer.plan.relations import DROPPED, at_line

@@ -29,10 +29,9 @@ from engage_hri.schemas.requests import Cancel, Outcome, Request, Unreadable
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.realizer.config import LEASE, RealizerConfig
-from engage_hri.services.realizer.perform.behavior_run import ABORT, LONGEST_WAY
+from engage_hri.services.realizer.perform.behavior_run import ABORT, LONGEST_WAY, Presence
 from engage_hri.services.realizer.perform.net_stream import telling_of_turn
 from engage_hri.services.realizer.perform.performance import BlockPerformance, SharedContext
-from engage_hri.services.realizer.perform.recognition_link import Presence
 from engage_hri.services.realizer.perform.steering import Steering
 from engage_hri.services.realizer.plan.known import BLOCK_END, qualified
 from engage_hri.services.realizer.plan.plan import Plan

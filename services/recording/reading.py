@@ -10,7 +10,8 @@ import re
 import struct
 import zlib
 from array import array
-from collections.abc import Iterator
+from bisect import bisect_right
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from io import BytesIO
 from math import isfinite
@@ -29,11 +30,22 @@ from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.fragments import HeadOwner
 from engage_hri.schemas.messages import Message as BusMessage
 from engage_hri.schemas.messages import decode
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.samples import Received, Sample, read_payload
-from engage_hri.services.recording.form import CHUNK, LOST, MORE, OWN, ChunkMark, MissingMessages, StoredForm, payload
+from engage_hri.services.recording.form import (
+    CHUNK,
+    CLOCK,
+    LOST,
+    MORE,
+    OWN,
+    ChunkMark,
+    MissingMessages,
+    StoredForm,
+    payload,
+)
 from engage_hri.services.recording.writing import PROFILE, Line
 
 _HEAD = struct.Struct("<BQ")
@@ -390,3 +402,62 @@ def _records(content: bytes) -> Iterator[tuple[int, int, int]]:
 
 def _stream(body: bytes) -> ReadDataStream:
     return ReadDataStream(BytesIO(body))
+
+
+# -- instants of messages, as times in a recording ----------------------------------------------------------------
+
+
+class RecordingTimes:
+    """Times in a recording. An instant of a clock that its recorder never knew has none."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._clock = recording.clock
+        self._began = recording.began
+        self._offsets: dict[str, tuple[list[Seconds], list[Seconds]]] = {}
+        """Offsets of each other clock to the recorder's, and from when on each was known."""
+        for at, told in recording.own(CLOCK):
+            for clock, known in told.items():
+                since, offsets = self._offsets.setdefault(clock, ([], []))
+                since.append(at)
+                offsets.append(known.offset)
+
+    def at(self, stamp: Stamp, told_at: Seconds) -> Seconds | None:
+        """Time of an instant, from the beginning of the recording. told_at: time at which its message came."""
+        if stamp.clock == self._clock:
+            return stamp.seconds - self._began
+        if stamp.clock not in self._offsets:
+            return None
+        since, offsets = self._offsets[stamp.clock]
+        # What was told before the clock was measured is taken by its first measurement.
+        return stamp.seconds + offsets[max(0, bisect_right(since, told_at) - 1)] - self._began
+
+    def told(self, message: object, came: Seconds) -> Seconds:
+        """Time that a message tells of; that at which it came, if it has none, or of a clock that was not known."""
+        stamp = getattr(message, "since" if isinstance(message, HeadOwner) else "at", None)
+        at = self.at(stamp, came) if isinstance(stamp, Stamp) else None
+        return came if at is None else at
+
+
+def messages(recording: Recording) -> Iterator[tuple[Received, Seconds]]:
+    """All messages that can be read, with the times that they tell of, or else at which they came."""
+    times = RecordingTimes(recording)
+    for number in range(len(recording)):
+        if not recording.key(number) or (received := recording.received(number)) is None:
+            continue
+        yield received, times.told(received.message, recording.time(number))
+
+
+def moved(value: Any, instant: Callable[[Stamp], Stamp]) -> Any:
+    """A message with other instants, everything else as it was."""
+    match value:
+        case Stamp():
+            return instant(value)
+        case Struct():
+            fields = {name: getattr(value, name) for name in value.__struct_fields__}
+            changed = {name: new for name, old in fields.items() if (new := moved(old, instant)) is not old}
+            return msgspec.structs.replace(value, **changed) if changed else value
+        case tuple():
+            items = tuple(moved(item, instant) for item in value)
+            same = all(new is old for new, old in zip(items, value, strict=True))
+            return value if same else items
+    return value

@@ -15,7 +15,7 @@ from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.interface import Bus, Hub, Received, Sample, Subscription
 from engage_hri.services.recording.player import Playback, readable
-from engage_hri.services.recording.times import RecordingTimes, moved
+from engage_hri.services.recording.reading import RecordingTimes, moved
 
 NAME = "replay"
 """Name of the participant that says what programs without a name said, and watches for a live robot."""

@@ -7,8 +7,7 @@ from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.client.people.actions import PersonActions
 from engage_hri.services.reports.ongoing_actions import ActionEvent
-from engage_hri.services.simulation.human import FACE, Act, Human, LookAt, Pause, Start, Stop
-from engage_hri.services.simulation.speech import Ears, SpokenWords
+from engage_hri.services.simulation.human import FACE, Act, Ears, Human, LookAt, Pause, SpokenWords, Start, Stop
 
 
 class Bystander:

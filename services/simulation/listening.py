@@ -13,8 +13,11 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.simulation.human import (
     FACE,
     TABLE,
+    THINKING,
     Act,
     Grab,
+    HeardSpeech,
+    Hearing,
     Human,
     Lay,
     Leave,
@@ -24,8 +27,8 @@ from engage_hri.services.simulation.human import (
     Start,
     Stop,
     Withdraw,
+    speech,
 )
-from engage_hri.services.simulation.speech import THINKING, HeardSpeech, Hearing, speech
 
 COMES: tuple[Act, ...] = (LookAt(TABLE), Pause(0.8), Sit(), Pause(0.8), LookAt(FACE))
 GOES: tuple[Act, ...] = (LookAt(TABLE), Pause(1.0), LookAt(FACE), Pause(1.0), Leave())

@@ -1,13 +1,39 @@
-"""The hypotheses of the thesis (5.2.2) that a system's own statistics can speak to: 6, 7, 8 and 11."""
+"""Conditions of the study, and the hypotheses of the thesis that statistics can speak to (5.2.2: 6, 7, 8 and 11).
 
-from collections.abc import Callable, Sequence
+The policies know nothing of a study: a condition is a configuration that any robot could be given. Thesis, chapter 5.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Literal, get_args
 
 from msgspec import Struct
 
 from engage_hri.schemas.units import Probability
-from engage_hri.services.study.conditions import BASELINE, DEGRADED
 from engage_hri.services.study.permutation import LEVEL, Paired, holm, paired, separate
 from engage_hri.services.study.records import SessionRecord
+
+Condition = Literal["operational", "degraded-generation", "degraded-recognition"]
+CONDITIONS: tuple[Condition, ...] = get_args(Condition)
+BASELINE: Condition = "operational"
+DEGRADED = tuple(condition for condition in CONDITIONS if condition != BASELINE)
+"""Conditions that are compared with the baseline."""
+
+DEGRADATIONS: Mapping[str, tuple[str, ...]] = {
+    "operational": (),
+    "degraded-generation": (),
+    "degraded-recognition": (
+        "simulation.faults.missed_look=0.5",
+        "simulation.faults.wrong_look=0.3",
+        "simulation.faults.dropped_speech=0.5",
+    ),
+}
+"""Settings that make a condition worse, besides `generation.condition`; weaker than the user's own settings.
+
+Degraded recognition is only named in the thesis. Here it is poor perception: half of the person's looks are not
+noticed, three in ten of the others are taken for a look at something near, and half of the person's utterances are
+not heard. The robot's own behavior is complete, but rests on this perception.
+"""
+
 
 Measure = Callable[[SessionRecord], float | None]
 

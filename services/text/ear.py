@@ -5,9 +5,8 @@ from functools import lru_cache
 
 from msgspec import Struct
 
-from engage_hri.services.text.marks import NO_IDS, Reader
+from engage_hri.services.text.marks import NO_IDS, Reader, problems
 from engage_hri.services.text.patterns import is_silent
-from engage_hri.services.text.pieces import problems
 
 
 class Heard(Struct, frozen=True):

@@ -3,7 +3,8 @@
 The marks are those of CommonMark, with tables, footnotes and strikethrough as GitHub has them, and of HTML. A parser
 of CommonMark reads a document as a whole: whether `*` begins an emphasis depends on how the paragraph ends. For a
 voice that makes no difference, and it cannot wait: an asterisk beside a word is not said in either case. So what
-stands beside a mark decides it. tests/text compares the letters with those that a parser finds.
+stands beside a mark decides it. tests/text compares the letters with those that a parser finds. What is found are
+pieces: words that are said, objects that are referred to, and what was left out.
 
     reader = Reader()
     pieces = [*reader.feed("See [the d", ids), *reader.feed("ocs](https://example.org).", ids), *reader.finish(ids)]
@@ -13,9 +14,10 @@ module `regex` tells of a pattern that it would match if more text came. Then th
 No mark is longer than `LOOK`, so that reading takes time in proportion to the text, whatever it is.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from html import unescape
 from string import digits
+from typing import Literal, NamedTuple
 from unicodedata import category
 
 import regex
@@ -23,8 +25,81 @@ from msgspec import Struct
 
 from engage_hri.schemas.advice import in_other_letters, meant
 from engage_hri.services.text import patterns as mark
-from engage_hri.services.text.patterns import LISTS
-from engage_hri.services.text.pieces import Ids, Kind, Piece, Reason
+from engage_hri.services.text.patterns import ADDRESSED, LISTS
+
+Kind = Literal["say", "symbol", "silent", "break", "refer", "left"]
+Reason = Literal["", "address", "citation", "direction", "tag", "thought", "definition", "bracket", "case"]
+"""Why something was left out, or said otherwise than it may have been meant. `bracket`: names no object, and is said
+as words. `case`: names an object in other letters, and refers to it."""
+
+
+class Piece(NamedTuple):
+    """A piece of a text.
+
+    kind: `say`: characters to be said. `symbol`: one that stands for others, which are not said as written.
+    `silent`: an emoji, or another character without a sound. `break`: a paragraph, an item, a heading or a row ends;
+    with the text `,`: a cell of a row. `refer`: the text is the id of an object. `left`: what is to be told.
+    place: characters of the author's text before it. end: those up to its end.
+    """
+
+    kind: Kind
+    text: str
+    place: int
+    end: int
+    reason: Reason = ""
+    certain: bool = False
+
+
+_TOLD: Mapping[Reason, str] = {
+    "thought": "thoughts were not said",
+    "direction": "stage directions were not said",
+    "citation": "citations were not said",
+    "address": "addresses were not said in full",
+    "definition": "definitions of links were not said",
+    "tag": "tags were not said",
+    "bracket": "brackets that are no reference were said as words",
+    "case": "ids were written in other letters than the world has",
+}
+_MOST = 3
+"""Examples in one line."""
+_LONGEST = 48
+"""Characters of one example."""
+
+
+def problems(left: Iterable[Piece]) -> tuple[str, ...]:
+    """Say in words what was left out of a text: one line a reason, with examples."""
+    found: dict[Reason, dict[str, None]] = {}
+    for each in left:
+        if each.kind == "left":
+            found.setdefault(each.reason, {})[_short(each.text)] = None
+    return tuple(f"{told}: {_examples(list(found[reason]))}" for reason, told in _TOLD.items() if reason in found)
+
+
+def _short(text: str) -> str:
+    text = " ".join(text.split())
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
+
+
+def _examples(texts: list[str]) -> str:
+    more = f" and {len(texts) - _MOST} more" if len(texts) > _MOST else ""
+    return f"{', '.join(texts[:_MOST])}{more}"
+
+
+_ANY = regex.compile(r"\[(?P<id>[^\s!\[\]]+)(?P<certain>!?)\](?=[^(])")
+
+
+class Ids:
+    """The ids of objects that a text may name. None: nobody knows the world, so that any word may be one."""
+
+    def __init__(self, ids: Collection[str] | None) -> None:
+        self.ids = frozenset(ids or ())
+        self.is_unknown = ids is None
+        named = rf"\[(?P<id>\L<ids>)(?P<certain>!?)\]{ADDRESSED}"
+        self.exact = _ANY if ids is None else regex.compile(named, ids=self.ids)
+        """Pattern of a bracket that names an object, `[id]` or `[id!]`; the longest id counts."""
+        self.folded = regex.compile(named, regex.I | regex.F, ids=self.ids) if self.ids else self.exact
+        """Pattern of one that does in other letters, maybe."""
+
 
 LOOK = 4000
 """Characters that a mark may have from its start to its end."""

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from engage_hri.schemas.tool import Gesture, Part, Refer, Say
 from engage_hri.services.client.chunking import Chunk, Chunker
 from engage_hri.services.text.ear import heard
-from engage_hri.services.text.pieces import Ids
+from engage_hri.services.text.marks import Ids
 from tests.random_cases import share_of
 
 

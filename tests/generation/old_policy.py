@@ -18,8 +18,7 @@ from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.references.motions import AT_REST, CURRENT_POSE, Motions, arm_of, hand_of
 from engage_hri.services.generation.references.pairs import ReferenceScene, channel_reliability, in_zone, reliability
-from engage_hri.services.generation.references.policy import Choices, Unreferable
-from engage_hri.services.generation.references.sequence import EXPECTED_DELAY
+from engage_hri.services.generation.references.policy import EXPECTED_DELAY, Choices, Unreferable
 from tests.generation.tables import in_gaze_cone, in_pointing_cylinder
 
 GESTURES: tuple[GestureChoice, ...] = get_args(GestureChoice)

@@ -14,7 +14,7 @@ from engage_hri.services.generation.references.motions import (
     onward_told,
 )
 from engage_hri.services.generation.references.pairs import POINT, Table, considered, shown
-from engage_hri.services.generation.references.sequence import HeadAndArms, unasked
+from engage_hri.services.generation.references.policy import HeadAndArms, unasked
 from tests.generation.tables import apart, body, option, refer, scene
 
 CONFIG = GenerationConfig()

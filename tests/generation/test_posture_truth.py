@@ -15,7 +15,7 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.references.sequence import EXPECTED_DELAY
+from engage_hri.services.generation.references.policy import EXPECTED_DELAY
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.generation.robots import Robot, robot
 from tests.generation.tables import option, refer

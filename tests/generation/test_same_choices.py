@@ -40,8 +40,7 @@ from engage_hri.services.generation.references.motions import (
     pose_after,
 )
 from engage_hri.services.generation.references.phrases import proposed
-from engage_hri.services.generation.references.policy import Choices, Unreferable
-from engage_hri.services.generation.references.sequence import references_apart
+from engage_hri.services.generation.references.policy import Choices, Unreferable, references_apart
 from engage_hri.services.generation.turns.plan import in_vain, plan_turn
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.generation.all_motions import all_motions

@@ -38,8 +38,7 @@ from engage_hri.services.perception.pieces.colors import written_palette
 from engage_hri.services.perception.pieces.finding import PieceFinder, learned
 from engage_hri.services.perception.pieces.spotting import SpottedPieces
 from engage_hri.services.runtime.service import Ready
-from engage_hri.services.simulation.human import Act, Ended, Human, Rule, Start
-from engage_hri.services.simulation.speech import speech
+from engage_hri.services.simulation.human import Act, Ended, Human, Rule, Start, speech
 from engage_hri.services.tangram.people.appendix_b import rules
 from engage_hri.services.tangram.people.head import Sightlines
 from engage_hri.services.tangram.people.person_at_table import PersonAtTable

@@ -8,7 +8,7 @@ from engage_hri.schemas.behaviors import Gesture, Speech
 from engage_hri.schemas.blocks import WarningFeedback
 from engage_hri.services.control.config import Stall, Variability
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.decide.lateness import STALL_FACTOR
+from engage_hri.services.realizer.decide.decisions import STALL_FACTOR
 from tests.realizer.planning import timed
 from tests.realizer.stage import block, together
 from tests.realizer.test_simulated_body import robot

@@ -8,8 +8,7 @@ from engage_hri.schemas.behaviors import Gesture, Mark, Speech, Wait
 from engage_hri.schemas.blocks import WarningFeedback
 from engage_hri.services.control.config import Stall, Variability
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.decide.decisions import Decisions
-from engage_hri.services.realizer.decide.lateness import STANDING, HeldUp
+from engage_hri.services.realizer.decide.decisions import STANDING, Decisions, HeldUp
 from engage_hri.services.realizer.foresee.expectations import Outlook
 from engage_hri.services.realizer.net.facts import Stops
 from engage_hri.services.realizer.points import ORIGIN, Point

@@ -5,9 +5,15 @@ import pytest
 from engage_hri.schemas.behaviors import Event, Gesture, Mark, Speech
 from engage_hri.services.bus.deadlines import LATE, Sight
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.decide.decisions import Decisions, Extend
-from engage_hri.services.realizer.decide.lateness import STALL_FACTOR, Late, LatenessWatch, Stalled
-from engage_hri.services.realizer.perform.recognition_link import event_deadline
+from engage_hri.services.realizer.decide.decisions import (
+    STALL_FACTOR,
+    Decisions,
+    Extend,
+    Late,
+    LatenessWatch,
+    Stalled,
+)
+from engage_hri.services.realizer.perform.behavior_run import event_deadline
 from engage_hri.services.realizer.plan.planner import plan_block
 from engage_hri.services.realizer.points import Point
 from tests.realizer.fake_body import FakeBody

@@ -5,7 +5,7 @@ from msgspec.structs import fields
 
 from engage_hri.schemas.behaviors import Wait
 from engage_hri.services.realizer.config import LATE, LEASE, RealizerConfig
-from engage_hri.services.realizer.decide.lateness import LATE_FACTOR, STALL_FACTOR
+from engage_hri.services.realizer.decide.decisions import LATE_FACTOR, STALL_FACTOR
 from engage_hri.services.realizer.report import SKEW
 from engage_hri.services.realizer.service import PULSE
 from engage_hri.services.realizer.together import planning

@@ -20,8 +20,7 @@ from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.bus.samples import Received
 from engage_hri.services.client.people.perceived_person import PerceivedActions
 from engage_hri.services.commandline.shell.config import Config
-from engage_hri.services.commandline.study.again import again
-from engage_hri.services.commandline.study.realizer_again import SentMessage
+from engage_hri.services.commandline.study.again import SentMessage, again
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.intake import Content
 from engage_hri.services.recognition.service import recognize

@@ -11,8 +11,7 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import Statistics
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.commandline.shell.config import Config
-from engage_hri.services.commandline.study.analyse import compare, found, numbered
-from engage_hri.services.commandline.study.recorded_sessions import Session, sessions
+from engage_hri.services.commandline.study.analyse import Session, compare, found, numbered, sessions
 from engage_hri.services.recording.disk import read
 from engage_hri.services.study.permutation import separate
 from engage_hri.services.study.records import SessionRecorder as Record

@@ -9,7 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from lxml import etree
 
-from engage_hri.services.recording.annotations import Annotation, Media, Tier, apart, eaf
+from engage_hri.services.recording.tiers import Annotation, Media, Tier, apart, eaf
 from tests.cli.command import Engage, engage
 from tests.recording.conftest import Anchor
 

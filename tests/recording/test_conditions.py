@@ -16,11 +16,10 @@ from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Bus, Sample
 from engage_hri.services.client.robot import Robot
 from engage_hri.services.commandline.shell.config import Config
-from engage_hri.services.commandline.study.recorded_sessions import Stretch, sessions, stretches
+from engage_hri.services.commandline.study.analyse import Stretch, sessions, stretches
 from engage_hri.services.recording.disk import read
-from engage_hri.services.recording.reading import Recording
+from engage_hri.services.recording.reading import Recording, messages
 from engage_hri.services.recording.tiers import tiers
-from engage_hri.services.recording.times import messages
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.tangram.people.config import SimulationConfig
 from tests.recording.files import recording, sample

@@ -16,9 +16,8 @@ from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.commandline.study.replay import control_of, keys_in
 from engage_hri.services.console.follow import following
 from engage_hri.services.recording.player import Playback
-from engage_hri.services.recording.reading import Recording
+from engage_hri.services.recording.reading import Recording, moved
 from engage_hri.services.recording.replay import Control, ReplayBus, replay
-from engage_hri.services.recording.times import moved
 from tests.recording.conftest import Anchor
 from tests.recording.files import recording, sample
 

@@ -16,9 +16,8 @@ from engage_hri.schemas.perception import ActionBegan, ActionEnded, Utterance
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Sample
-from engage_hri.services.recording.annotations import Annotation, Media, Tier, apart, eaf, table
 from engage_hri.services.recording.reading import Recording
-from engage_hri.services.recording.tiers import tiers
+from engage_hri.services.recording.tiers import Annotation, Media, Tier, apart, eaf, table, tiers
 from tests.recording.files import recording, sample
 
 DATE = "2026-11-24T17:00:00+00:00"

@@ -24,8 +24,8 @@ from engage_hri.services.runtime.service import Ready, Service, running
 from engage_hri.services.tangram.collaboration.config import CollaborationConfig
 from engage_hri.services.tangram.collaboration.service import collaborate
 from engage_hri.services.tangram.people.config import SimulationConfig
-from engage_hri.services.tangram.people.habits import Habits
 from engage_hri.services.tangram.people.service import simulate
+from engage_hri.services.tangram.people.stochastic import Habits
 from tests.bus.faulty import Faults, FaultyHub
 
 LIMIT = 900.0

@@ -12,7 +12,7 @@ from engage_hri.schemas.units import Stamp
 from engage_hri.services.simulation.company import Bystander
 from engage_hri.services.simulation.human import FACE, Act, Grab, Lay, LookAt, Start, Stop
 from engage_hri.services.simulation.listening import AttentiveHuman
-from engage_hri.services.tangram.people.requests import requested_placement
+from engage_hri.services.tangram.people.stochastic import requested_placement
 from engage_hri.services.tangram.table import tangram_table
 
 AT = Stamp("loop", 0.0)

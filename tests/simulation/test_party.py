@@ -9,8 +9,7 @@ import pytest
 
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import ActionBegan, Utterance
-from engage_hri.services.simulation.party import NAMES, Party, Saying, ScriptLine
-from engage_hri.services.simulation.party_words import ANY_ANSWER, TALK, answer
+from engage_hri.services.simulation.party import ANY_ANSWER, NAMES, TALK, Party, Saying, ScriptLine, answer
 from engage_hri.services.tangram.collaboration.host import QUESTIONS
 from tests.recognition.observations import ROBOT, stamp
 from tests.simulation.party_play import Play

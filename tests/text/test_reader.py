@@ -12,8 +12,7 @@ from engage_hri.services.control.contract.body import Spoke
 from engage_hri.services.control.serving.words_for_voice import progress_of, spoken
 from engage_hri.services.control.voice.timeline import uttered
 from engage_hri.services.text.ear import heard, is_spoken, said
-from engage_hri.services.text.marks import Reader
-from engage_hri.services.text.pieces import Ids, Piece, problems
+from engage_hri.services.text.marks import Ids, Piece, Reader, problems
 from tests.random_cases import share_of
 from tests.text.mixtures import OBJECTS, Maker, letters, plain_text
 

@@ -1,12 +1,12 @@
 """Command `engage demo`: the whole system in this process plays the anchor tangram with a simulated person."""
 
 import asyncio
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -19,7 +19,7 @@ from engage_hri.services.commandline.look.window import can_open, looking_on, se
 from engage_hri.services.commandline.shell.config import Config
 from engage_hri.services.commandline.shell.options import Embodied, Kiosk, Shown, Simulated, VirtualTime, Written
 from engage_hri.services.commandline.shell.outputs import Outputs
-from engage_hri.services.commandline.shell.process import DONE, run
+from engage_hri.services.commandline.shell.process import DONE, first_of, run
 from engage_hri.services.commandline.shell.recording_file import needed
 from engage_hri.services.commandline.shell.settings import AT_PAGES, TRANSCRIPT
 from engage_hri.services.console.follow import Sink
@@ -160,22 +160,11 @@ async def _shown(
                     await stays.enter_async_context(page)
                     is_open = True
                 if kiosk:
-                    await _first(over.wait(), _left(shown, None))
+                    await first_of(over.wait(), _left(shown, None))
                 else:
                     await over.wait()
                     if again:
                         await _left(shown, shown.bus.now())
-
-
-async def _first(*waits: Coroutine[Any, Any, Any]) -> None:
-    """Wait for the first of several."""
-    tasks = [asyncio.create_task(each) for each in waits]
-    try:
-        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-    finally:
-        for each in tasks:
-            each.cancel()
-        await asyncio.wait(tasks)
 
 
 async def _left(shown: "WindowServer", last: Seconds | None) -> None:

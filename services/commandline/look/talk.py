@@ -28,7 +28,7 @@ from engage_hri.services.commandline.embedding import services
 from engage_hri.services.commandline.look.window import can_open, looking_on, seat_refusal, web, windowed
 from engage_hri.services.commandline.shell.options import Embodied, Hearing, Kiosk, Shown, Written
 from engage_hri.services.commandline.shell.outputs import LOG, Outputs, complain
-from engage_hri.services.commandline.shell.process import DONE, run_until_signal
+from engage_hri.services.commandline.shell.process import DONE, first_of, run_until_signal
 from engage_hri.services.commandline.shell.roster import ROBOT, complete
 from engage_hri.services.commandline.shell.settings import AT_PAGES, RobotConfig
 from engage_hri.services.console.follow import following
@@ -278,16 +278,7 @@ async def _talk(
             ):
                 if config.hearing.recognizer == "sphinx":
                     tell(f"It understands these alone: {', '.join(config.hearing.phrases)}.")
-                talking = asyncio.create_task(_managed(manager, robot), name="manager")
-                heard = asyncio.create_task(_over(over, robot), name="sound")
-                try:
-                    await asyncio.wait((talking, heard), return_when=asyncio.FIRST_COMPLETED)
-                finally:
-                    talking.cancel()
-                    heard.cancel()
-                    await asyncio.wait((talking, heard))
-            if not talking.cancelled():
-                talking.result()
+                await first_of(_managed(manager, robot), _over(over, robot))
 
 
 async def _managed(manager: ManagerFile, robot: Robot) -> None:

@@ -25,7 +25,7 @@ from engage_hri.services.bus.config import is_encrypted
 from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.bus.keyring import Keys, read_keys
 from engage_hri.services.commandline.shell.outputs import LOG, Patient, beneath, complain, without_waiting
-from engage_hri.services.commandline.shell.process import FAILED, run_until_signal, until_closed
+from engage_hri.services.commandline.shell.process import FAILED, first_of, run_until_signal, until_closed
 from engage_hri.services.commandline.shell.supervisor import (
     each_line,
     ended_in_order,
@@ -100,17 +100,12 @@ async def _watch(options: Options) -> int:
             "the router of all others": _command(options, options.listen, near),
         }
     tell = _teller("standard output", beneath(sys.stdout).fileno())
-    watching = [
-        asyncio.create_task(watched([*each, "--attended"], name, tell, LOG.warning, Denials(tell).feed))
-        for name, each in commands.items()
-    ]
-    try:
-        done, _ = await asyncio.wait(watching, return_when=asyncio.FIRST_COMPLETED)
-        return done.pop().result()
-    finally:
-        for each in watching:
-            each.cancel()
-        await asyncio.wait(watching)
+    return await first_of(
+        *(
+            watched([*each, "--attended"], name, tell, LOG.warning, Denials(tell).feed)
+            for name, each in commands.items()
+        )
+    )
 
 
 def _keys(options: Options) -> Keys | None:

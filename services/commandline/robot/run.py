@@ -1,6 +1,5 @@
 """Command `engage run SERVICES`: one service, or several together, as one process on the real bus."""
 
-import asyncio
 from collections.abc import Mapping
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from engage_hri.services.commandline.shell.outputs import complain
 from engage_hri.services.commandline.shell.process import (
     DONE,
     end_after_the_parent,
+    first_of,
     run_until_signal,
     unique_name,
     until_closed,
@@ -91,18 +91,8 @@ async def _serve(options: Options, names: tuple[str, ...], config: RobotConfig) 
             await stack.enter_async_context(
                 hinting(hub.join(unique_name("run")), config.bus.connect, {*ROBOT} - {*names})
             )
-        serving = asyncio.create_task(_until_over({names[0]: hub, **others}, services), name=options.services)
-        waiting = {serving}
-        if options.attended:
-            waiting.add(asyncio.create_task(until_closed(), name="parent"))
-        try:
-            await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            for task in waiting:
-                task.cancel()
-            await asyncio.wait(waiting)
-    if not serving.cancelled():
-        serving.result()
+        serving = _until_over({names[0]: hub, **others}, services)
+        await first_of(serving, *((until_closed(),) if options.attended else ()))
 
 
 async def _until_over(hubs: Mapping[str, Hub], services: Mapping[str, Service]) -> None:

@@ -128,6 +128,21 @@ async def forever() -> None:
     await asyncio.get_running_loop().create_future()
 
 
+async def first_of(*work: Coroutine[Any, Any, T]) -> T:
+    """Run several until the first is over, and end the others. Returns its result, or raises the error of any."""
+    tasks = [asyncio.create_task(each) for each in work]
+    try:
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.wait(tasks)
+    results = [task.result() for task in tasks if not task.cancelled()]
+    if not results:
+        raise asyncio.CancelledError
+    return results[0]
+
+
 async def until_closed() -> None:
     """Wait until the other end of standard input is closed."""
     while await typed():

@@ -67,17 +67,17 @@ def _path(options: Options, name: str) -> Path:
 
 def _made(name: str, path: Path, recording: "Recording", options: Options) -> bytes:
     """Content of one file. path: where it will be."""
-    from engage_hri.services.recording import annotations, settings, tiers
+    from engage_hri.services.recording import settings, tiers
     from engage_hri.services.recording.reading import BILLION
 
     match name:
         case "elan":
             date = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(recording.wall / BILLION))
             film = path.with_suffix(".mp4")
-            media = annotations.Media(film.resolve().as_uri(), f"./{quote(film.name)}") if film.exists() else None
-            return annotations.eaf(tiers.tiers(recording), date=date, media=media)
+            media = tiers.Media(film.resolve().as_uri(), f"./{quote(film.name)}") if film.exists() else None
+            return tiers.eaf(tiers.tiers(recording), date=date, media=media)
         case "csv":
-            text = annotations.table(tiers.tiers(recording))
+            text = tiers.table(tiers.tiers(recording))
         case "lines":
             text = lines_of(recording)
         case _:
@@ -88,7 +88,7 @@ def _made(name: str, path: Path, recording: "Recording", options: Options) -> by
 def lines_of(recording: "Recording") -> str:
     """The messages that have a line, as `engage watch --json` would have printed them."""
     from engage_hri.schemas.messages import line
-    from engage_hri.services.recording.times import messages
+    from engage_hri.services.recording.reading import messages
 
     told = (line(received.message) for received, _ in messages(recording) if not received.past)
     return "".join(f"{line}\n" for line in told if line is not None)

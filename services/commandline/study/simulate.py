@@ -24,8 +24,7 @@ from engage_hri.services.commandline.study.session import Order, SessionResult, 
 from engage_hri.services.commandline.study.tables import StudyReport, session_line
 from engage_hri.services.runtime.service import installed_version
 from engage_hri.services.study import summary
-from engage_hri.services.study.conditions import CONDITIONS, DEGRADATIONS
-from engage_hri.services.study.hypotheses import HypothesisResult, findings
+from engage_hri.services.study.hypotheses import CONDITIONS, DEGRADATIONS, HypothesisResult, findings
 from engage_hri.services.study.records import SessionRecord
 from engage_hri.services.study.summary import NumberTable
 

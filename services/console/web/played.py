@@ -10,8 +10,7 @@ from engage_hri.services.console.heard import Heard
 from engage_hri.services.console.web.frames import PlaybackPlace
 from engage_hri.services.console.web.picture import Picture
 from engage_hri.services.recording.player import Playback, Timeline
-from engage_hri.services.recording.reading import Recording, received
-from engage_hri.services.recording.times import RecordingTimes
+from engage_hri.services.recording.reading import Recording, RecordingTimes, received
 
 BEFORE: Seconds = 30.0
 """Time before a place that is played at once when somebody goes there: what the lanes and the words still show."""

@@ -26,7 +26,7 @@ from engage_hri.services.console.web.scene import laid
 from engage_hri.services.console.web.seats import SETTLED, Invitation
 from engage_hri.services.console.web.service import WindowServer
 from engage_hri.services.console.web.stage import StageFace
-from engage_hri.services.text.pieces import Ids
+from engage_hri.services.text.marks import Ids
 
 REACH: Seconds = 0.9
 """Time that a person takes to lay a thing elsewhere."""

@@ -18,7 +18,7 @@ from engage_hri.services.perception.eyes.service import see
 from engage_hri.services.perception.eyes.watching import OutsideWatching, SourceLost, SourceOrder
 from engage_hri.services.perception.testing.laws import Evidence, Finding, Told, TrueLook
 from engage_hri.services.recording.disk import read
-from engage_hri.services.recording.times import RecordingTimes
+from engage_hri.services.recording.reading import RecordingTimes
 from engage_hri.services.runtime.packages import data_folder
 from engage_hri.services.runtime.service import Ready, running
 

@@ -18,19 +18,19 @@ from engage_hri.schemas.references import BLOCK_ITSELF
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Containing
 from engage_hri.services.realizer.config import RealizerConfig
-from engage_hri.services.realizer.decide.decisions import Begin, Decisions, Effect, Extend
-from engage_hri.services.realizer.decide.lateness import Late, Stalled
+from engage_hri.services.realizer.decide.decisions import Begin, Decisions, Effect, Extend, Late, Stalled
 from engage_hri.services.realizer.net.running import Observer, RunningNet
 from engage_hri.services.realizer.perform.behavior_run import (
     BehaviorRun,
     ControlLink,
     PointPassed,
+    Presence,
+    RecognitionLink,
     Stage,
     SyncPointFutures,
     all_ended,
 )
 from engage_hri.services.realizer.perform.net_stream import NetStream
-from engage_hri.services.realizer.perform.recognition_link import Presence, RecognitionLink
 from engage_hri.services.realizer.plan.known import Known, is_named_in
 from engage_hri.services.realizer.plan.plan import Plan
 from engage_hri.services.realizer.plan.planner import planned_again, reestimated

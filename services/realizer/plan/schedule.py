@@ -29,9 +29,6 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.realizer.net.petri_net import Bound, PetriNet, Place
 from engage_hri.services.realizer.points import EPSILON, Point
 
-LAGS_AN_ELEMENT = 32
-"""Number of lags that take as long as one element of a block: see `steps`."""
-
 
 class Lag(Struct, frozen=True, gc=False):
     """Lower bound: `target` is no earlier than `source` + `seconds`, perhaps negative. reason: the caller's index."""

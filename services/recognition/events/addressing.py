@@ -31,7 +31,7 @@ from msgspec import Struct, field
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.events.limits import ROUNDING
 from engage_hri.services.recognition.events.listener_sign import SignPart
-from engage_hri.services.text.calling import greeting_before, without_honorific
+from engage_hri.services.text.listening import greeting_before, without_honorific
 
 LONGEST_UNKNOWN: Seconds = 3.0
 """Time after which a sound that still goes on is speech, and it is decided by the looks so far to whom. Ours."""

@@ -1,6 +1,10 @@
 """Plans of the collaboration manager, as generators: a plan yields a wish, and is sent the answer to it.
 
 Pure: neither bus nor clock. The service grants the wishes; a test plays the robot and the human by hand.
+
+The scripted plan is the transcript of thesis Appendix B. The robot's words are the source's; steps 7-17 are ours. The
+id of a fragment, and of the block of its connection events, is its step; it ends in `ours` where the source has no
+such step.
 """
 
 from collections.abc import Generator, Iterable
@@ -8,8 +12,10 @@ from typing import TypeVar, cast
 
 from msgspec import Struct
 
+from engage_hri.schemas.footprints import Side
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.recognition import EngagementLevel
+from engage_hri.schemas.relations import Relation
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import Entity
 from engage_hri.services.tangram.collaboration.config import CollaborationConfig
@@ -20,7 +26,7 @@ from engage_hri.services.tangram.collaboration.fragments import (
     fragment,
     request,
 )
-from engage_hri.services.tangram.collaboration.placement import has_been_placed
+from engage_hri.services.tangram.collaboration.pieces_in_view import has_been_placed
 from engage_hri.services.tangram.collaboration.task import Goal, Instruction, check
 from engage_hri.services.tangram.table import TangramTable
 
@@ -307,3 +313,48 @@ def task(manager: Manager) -> Plan[None]:
     yield from manager.say("finished", (finished,), look=False)
     yield from manager.say("goodbye", ("Thanks for playing. That was fun, goodbye.",), look=False)
     yield from manager.farewell()
+
+
+# -- Appendix B ---------------------------------------------------------------------------------------------------
+
+
+AS_IN_STEP_19 = Relation("purple-triangle", "top right", "trapezoid")
+"""Place where the human puts the piece, against step 18; the robot says "good" in step 20 all the same."""
+
+
+def asks(step: str, piece: str, side: Side, landmark: str, deictic: str = "", *also: Relation) -> Turn:
+    """A request for a placement. deictic: the word that may stand for the piece. also: other places that will do."""
+    wanted = Relation(piece, side, landmark)
+    return Turn(step=step, instruction=Instruction(wanted=wanted, deictic=deictic, also=also))
+
+
+def turns(manager: Manager) -> tuple[Turn, ...]:
+    """The robot's turns in order; the human's steps (1, 6, 19, 22, 26) lie between them."""
+    return (
+        Turn(step="step-2", say=("Hello, let's make a tangram.",)),
+        Turn(step="step-3", say=manager.introduction(), look=False),
+        Turn(step="step-4", say=("Okay, let's start.",)),
+        asks("step-5", "blue-square", "top", "rectangle"),
+        *OURS,
+        asks("step-18", "purple-triangle", "top right", "pink-square", "that", AS_IN_STEP_19),
+        Turn(step="step-20"),
+        asks("step-21", "green-square", "left", "blue-square", "this"),
+        Turn(step="step-23"),
+        Turn(step="step-24", say=("Look, we made an anchor.",), look=False),
+        Turn(step="step-25", say=("Thanks for playing. That was fun, goodbye.",), look=False),
+    )
+
+
+OURS = (
+    Turn(step="step-7-ours"),
+    asks("step-8-ours", "trapezoid", "top", "blue-square"),
+    Turn(step="step-9-ours"),
+    asks("step-10-ours", "yellow-triangle", "bottom", "rectangle"),
+    Turn(step="step-11-ours"),
+    asks("step-12-ours", "red-square", "bottom left", "yellow-triangle"),
+    Turn(step="step-13-ours"),
+    asks("step-14-ours", "pink-square", "bottom right", "yellow-triangle"),
+    Turn(step="step-15-ours"),
+    asks("step-16-ours", "pink-triangle", "top left", "red-square"),
+    asks("step-17-ours", "purple-square", "right", "blue-square"),
+)

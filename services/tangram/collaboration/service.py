@@ -19,11 +19,10 @@ from engage_hri.services.reports.ongoing_actions import ActionEvent
 from engage_hri.services.runtime.service import Ready
 from engage_hri.services.runtime.settings import tell_settings
 from engage_hri.services.tangram.collaboration import plans
-from engage_hri.services.tangram.collaboration.appendix_b import turns
 from engage_hri.services.tangram.collaboration.config import CollaborationConfig
 from engage_hri.services.tangram.collaboration.host import host
-from engage_hri.services.tangram.collaboration.pieces_in_view import PiecesInView
-from engage_hri.services.tangram.collaboration.placement import has_been_placed
+from engage_hri.services.tangram.collaboration.pieces_in_view import PiecesInView, has_been_placed
+from engage_hri.services.tangram.collaboration.plans import turns
 from engage_hri.services.tangram.table import tangram_table
 
 

@@ -10,7 +10,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.relations import Relation, relation, relations
 from engage_hri.schemas.world import Entity
-from engage_hri.services.tangram.collaboration.placement import TRUSTED
+from engage_hri.services.tangram.collaboration.pieces_in_view import TRUSTED
 from engage_hri.services.tangram.table import TangramTable
 
 

@@ -58,8 +58,8 @@ class SimulationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     human: `appendix-b` follows Appendix B by the ids of the robot's blocks; `misplacing` does too, but lays one
     piece wrongly; `listening` does what the robot's words say, whatever the manager's plan; `stochastic` too, with
-    the habits, pace and mistakes of `habits.py`; `attentive` looks where the robot looks, meets its eyes, and nods
-    when it has spoken, says yes to a question, or does what it asks for; `party` is several people who talk among
+    the habits, pace and mistakes of `Habits`; `attentive` looks where the robot looks, meets its eyes, and nods when
+    it has spoken, says yes to a question, or does what it asks for; `party` is several people who talk among
     themselves, and answer what the robot asks them; `none` leaves the table alone.
     """
 

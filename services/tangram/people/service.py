@@ -22,11 +22,9 @@ from engage_hri.services.simulation.still import show_company, table_world
 from engage_hri.services.tangram.people.appendix_b import misplacing_rules, rules
 from engage_hri.services.tangram.people.cameras import Cameras
 from engage_hri.services.tangram.people.config import SimulationConfig
-from engage_hri.services.tangram.people.habits import Habits
 from engage_hri.services.tangram.people.head import Sightlines
 from engage_hri.services.tangram.people.person_at_table import PersonAtTable
-from engage_hri.services.tangram.people.requests import requested_placement
-from engage_hri.services.tangram.people.stochastic import StochasticHuman
+from engage_hri.services.tangram.people.stochastic import Habits, StochasticHuman, requested_placement
 from engage_hri.services.tangram.people.table import Table
 from engage_hri.services.tangram.table import tangram_table
 

@@ -1,9 +1,14 @@
 """A person with the statistics of Table 2.1 of the thesis: looks, answers and errs by chance, and is sometimes busy.
 
 Pure; chance comes from outside. The person knows only what can be heard and seen of the robot: its words, looks and
-points, as realised. `Habits` has the numbers, each with its source.
+points, as realised. Requests must be in the words of the tangram's; known are the pieces by color and shape, the
+eight directions, and that "this" is the piece at which the robot points.
+
+`Habits` has the numbers, each with its source. They are values of a class and no settings: a study compares robots
+that meet the same person. A study of other people gives `simulate` other habits.
 """
 
+import re
 from collections.abc import Callable
 from heapq import heappop, heappush
 from itertools import count
@@ -21,7 +26,10 @@ from engage_hri.services.simulation.chance import Chance, Delays
 from engage_hri.services.simulation.human import (
     FACE,
     TABLE,
+    THINKING,
     Act,
+    HeardSpeech,
+    Hearing,
     Human,
     Lay,
     Leave,
@@ -31,12 +39,105 @@ from engage_hri.services.simulation.human import (
     Start,
     Stop,
     Withdraw,
+    speech,
 )
 from engage_hri.services.simulation.listening import COMES, GOES, moves
-from engage_hri.services.simulation.speech import THINKING, HeardSpeech, Hearing, speech
-from engage_hri.services.tangram.people.habits import Habits
-from engage_hri.services.tangram.people.requests import is_request, requested_placement
 from engage_hri.services.tangram.table import TangramTable
+
+# -- habits -------------------------------------------------------------------------------------------------------
+
+
+class Habits(Struct, frozen=True, kw_only=True):
+    """Habits of the stochastic person ("they" below). Delays are least, mean and longest, in seconds."""
+
+    follows_point: Probability = 0.929
+    """Share of the robot's points that they follow with a look. Table 2.1, directed gaze."""
+    follows_look: Probability = 0.8
+    """The same for looks without a point. Ours: the table does not separate gaze with and without pointing."""
+    follow_delay: tuple[Seconds, Seconds, Seconds] = (0.0, 0.3, 2.0)
+    """Delay from the robot's look or point to theirs. Table 2.1."""
+    answers_look: Probability = 0.458
+    """Share of the robot's looks at their face that they answer, times `propensity`. Table 2.1: facial gaze."""
+    look_delay: tuple[Seconds, Seconds, Seconds] = (0.0, 0.7, 1.5)
+    """Delay from the robot's look to theirs. Table 2.1."""
+    answers_turn: Probability = 0.682
+    """Share of the turns that they answer, or begin to carry out, in time. Table 2.1, adjacency pair. If they do
+    not, and the turn was a request, they study the pieces first."""
+    answer_delay: tuple[Seconds, Seconds, Seconds] = (0.0, 0.4, 1.1)
+    """Delay from the end of the turn to the answer. Table 2.1."""
+    study: tuple[Seconds, Seconds, Seconds] = (4.0, 9.0, 60.0)
+    """Time for which they study the pieces: the busy regime. Thesis 2.3 has it; the numbers are ours."""
+    hesitates: tuple[Seconds, Seconds, Seconds] = (0.2, 0.8, 3.0)
+    """Time for which they look at the piece before they reach for it. Ours, with the two that follow: sessions of the
+    thesis' participants take 345 s, with a standard deviation of 96 s."""
+    fits: tuple[Seconds, Seconds, Seconds] = (1.0, 7.0, 24.0)
+    """Time for which they turn it to and fro where it is to lie, until it fits. Ours."""
+    pace: tuple[Seconds, Seconds, Seconds] = (0.5, 1.0, 2.5)
+    """Factor on these two times and on those of study and search, drawn once for each person. Ours."""
+    busy_answers: Probability = 0.25
+    """Factor on these three shares, and on what they do unasked, while they study or move pieces. Ours."""
+    search: tuple[Seconds, Seconds, Seconds] = (0.3, 1.5, 6.0)
+    """Time for which they search for a piece without having seen the robot point or look at it. Ours."""
+    hears: Probability = 0.97
+    """Share of the robot's utterances that they hear. Ours."""
+    guesses: Probability = 0.5
+    """Probability of a guess which piece "this" or "that" is, if they have not seen it shown; else they ask. Ours."""
+    confuses: Probability = 0.06
+    """Share of the pieces, not seen shown, that they confuse with one of the same color or shape. Ours."""
+    confuses_shown: Probability = 0.01
+    """The same for pieces that they have seen the robot show. Ours."""
+    misplaces: Probability = 0.05
+    """Share of the pieces that they lay on another side of the landmark than asked. Ours."""
+    backchannels: Probability = 0.03
+    """Share of the robot's words after which they nod, or say a brief word. Ours."""
+    speaks: Probability = 0.3
+    """Share of backchannels and answers that are words; the others are nods. Ours."""
+    looks_up_every: Seconds = 40.0
+    """Mean time between unasked looks at the robot's face, at a `propensity` of 1. Ours."""
+    directs_every: Seconds = 90.0
+    """Mean time between unasked looks or points at a piece, while the robot is silent. Ours."""
+    points: Probability = 0.4
+    """Share of these looks and points that are points. Ours."""
+    glance: Seconds = 1.2
+    """Length of a look at a face or a thing. Ours."""
+    reports: Probability = 0.7
+    """Share of the laid pieces after which they look at the robot's face, times `propensity`. Ours."""
+
+
+# -- the robot's requests -----------------------------------------------------------------------------------------
+
+
+REQUEST = re.compile(
+    r"(?:move|fix|put) (?P<piece>.+?) so that it is touching the (?P<side>[a-z ]+?) of (?P<landmark>.+)"
+)
+POINTED = ("this", "that")
+
+
+def is_request(utterance: HeardSpeech) -> bool:
+    """Tell whether the robot asks for a piece to be laid somewhere."""
+    return REQUEST.search(utterance.words) is not None
+
+
+def requested_placement(utterance: HeardSpeech, table: TangramTable) -> Lay | None:
+    """The placement for which the robot asks; None if it asks for none, or if words and pointing leave it open."""
+    request = REQUEST.search(utterance.words)
+    if request is None:
+        return None
+    piece = utterance.pointed if request["piece"] in POINTED else _piece_called(request["piece"], table)
+    landmark = _piece_called(request["landmark"], table)
+    side = next((side for side in SIDES if side == request["side"].removesuffix(" side")), None)
+    return Lay(piece, side, landmark) if piece and landmark and side else None
+
+
+def _piece_called(phrase: str, table: TangramTable) -> str:
+    """Id of the only piece with the color and shape of the phrase; empty if none or several have them."""
+    words = set(phrase.split()) - {"the", "a", "piece"}
+    meant = [piece.id for piece in table.pieces if words <= {piece.color, piece.shape}]
+    return meant[0] if words and len(meant) == 1 else ""
+
+
+# -- the person ---------------------------------------------------------------------------------------------------
+
 
 NOD: Seconds = 0.5
 WORD: Seconds = 0.5

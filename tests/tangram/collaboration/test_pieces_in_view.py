@@ -10,8 +10,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.relations import Relation, relation
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.tangram.collaboration.pieces_in_view import PiecesInView
-from engage_hri.services.tangram.collaboration.placement import has_been_placed
+from engage_hri.services.tangram.collaboration.pieces_in_view import PiecesInView, has_been_placed
 from engage_hri.services.tangram.collaboration.task import Instruction, check
 from engage_hri.services.tangram.table import tangram_table
 

@@ -10,7 +10,6 @@ from engage_hri.schemas.footprints import poses_touching
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.recognition import EngagementLevel
 from engage_hri.schemas.world import Entity
-from engage_hri.services.tangram.collaboration import appendix_b
 from engage_hri.services.tangram.collaboration.config import CollaborationConfig
 from engage_hri.services.tangram.collaboration.plans import (
     Attendee,
@@ -25,6 +24,7 @@ from engage_hri.services.tangram.collaboration.plans import (
     Plan,
     script,
     task,
+    turns,
 )
 from engage_hri.services.tangram.table import tangram_table
 
@@ -138,7 +138,7 @@ def manager(**config: float) -> Manager:
 
 def scripted(player: Player) -> dict[str, TurnFragment]:
     the_manager = manager()
-    return {fragment.id: fragment for fragment in player.play(script(the_manager, appendix_b.turns(the_manager)))}
+    return {fragment.id: fragment for fragment in player.play(script(the_manager, turns(the_manager)))}
 
 
 @pytest.mark.parametrize(
@@ -169,7 +169,7 @@ def test_the_robot_says_what_it_says_in_appendix_b(step: str, words: str) -> Non
 @pytest.mark.parametrize("mode", ["scripted", "task"])
 def test_when_somebody_leaves_the_robot_goes_on_with_who_is_there_then(mode: str) -> None:
     player, the_manager = Player(people=("ann", "ben")), manager()
-    plan = script(the_manager, appendix_b.turns(the_manager)) if mode == "scripted" else task(the_manager)
+    plan = script(the_manager, turns(the_manager)) if mode == "scripted" else task(the_manager)
     performed = player.play(plan)
     spoken_to = [fragment.addressee for fragment in performed]
 

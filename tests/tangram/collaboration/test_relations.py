@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.footprints import PiecePose, poses_touching
 from engage_hri.schemas.relations import Relation, relation, relations
 from engage_hri.schemas.world import Entity
-from engage_hri.services.tangram.collaboration.placement import has_been_placed
+from engage_hri.services.tangram.collaboration.pieces_in_view import has_been_placed
 from engage_hri.services.tangram.collaboration.task import Goal, Instruction, check
 from engage_hri.services.tangram.table import tangram_table
 

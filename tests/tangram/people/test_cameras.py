@@ -41,8 +41,8 @@ from engage_hri.services.simulation.human import (
     Start,
     Stop,
     Withdraw,
+    speech,
 )
-from engage_hri.services.simulation.speech import speech
 from engage_hri.services.tangram.people.cameras import Cameras
 from engage_hri.services.tangram.people.config import PerceptionFaults, SimulationConfig
 from engage_hri.services.tangram.people.head import Sightlines, SimulatedHead, angle, unit

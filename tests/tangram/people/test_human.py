@@ -20,8 +20,8 @@ from engage_hri.services.simulation.human import (
     Start,
     Stop,
     Word,
+    speech,
 )
-from engage_hri.services.simulation.speech import speech
 from engage_hri.services.tangram.people.appendix_b import rules
 
 AT = Stamp("loop", 0.0)

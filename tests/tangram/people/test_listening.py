@@ -10,7 +10,7 @@ from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.simulation.human import Act, Human, Lay, Leave
 from engage_hri.services.simulation.listening import ListeningHuman
-from engage_hri.services.tangram.people.requests import requested_placement
+from engage_hri.services.tangram.people.stochastic import requested_placement
 from engage_hri.services.tangram.table import tangram_table
 
 AT = Stamp("loop", 0.0)

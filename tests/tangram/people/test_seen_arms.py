@@ -20,7 +20,7 @@ from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.realizer.service import realize
 from engage_hri.services.runtime.service import running
 from engage_hri.services.tangram.people.config import SimulationConfig
-from engage_hri.services.tangram.people.seen_arms import PATIENCE, SeenArms
+from engage_hri.services.tangram.people.person_at_table import PATIENCE, SeenArms
 from engage_hri.services.tangram.people.service import simulate
 from engage_hri.services.tangram.table import tangram_table
 

@@ -13,9 +13,8 @@ from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorLost
 from engage_hri.schemas.units import Stamp
 from engage_hri.schemas.world import World
-from engage_hri.services.tangram.people.habits import Habits
 from engage_hri.services.tangram.people.person_at_table import PersonAtTable
-from engage_hri.services.tangram.people.stochastic import StochasticHuman
+from engage_hri.services.tangram.people.stochastic import Habits, StochasticHuman
 from engage_hri.services.tangram.people.table import Table
 from engage_hri.services.tangram.table import tangram_table
 

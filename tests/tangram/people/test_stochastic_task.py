@@ -4,7 +4,7 @@ from engage_hri.schemas.perception import ActionBegan
 from engage_hri.schemas.world import World
 from engage_hri.services.generation.config import Condition
 from engage_hri.services.tangram.collaboration.task import Goal
-from engage_hri.services.tangram.people.habits import Habits
+from engage_hri.services.tangram.people.stochastic import Habits
 from engage_hri.services.tangram.table import tangram_table
 from tests.scenario.playing import Record, play
 

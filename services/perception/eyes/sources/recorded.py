@@ -20,7 +20,7 @@ class RecordedSource(LandmarkSource):
         super().__init__(settings)
         try:
             from engage_hri.services.recording.disk import read
-            from engage_hri.services.recording.times import messages
+            from engage_hri.services.recording.reading import messages
         except ImportError as error:
             raise missing("record", error) from error
         told: dict[str, list[tuple[Seconds, FaceLandmarks]]] = {}

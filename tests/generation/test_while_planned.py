@@ -1,10 +1,9 @@
 """What happens while a fragment is planned: an inhibition, a cancellation, a question that takes its time."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
+from typing import Any
 from unittest.mock import patch
-
-import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Gaze, Pointing, Reference, Speech, SpeechOption
@@ -12,7 +11,6 @@ from engage_hri.schemas.body import EstimateBehaviors
 from engage_hri.schemas.fragments import FragmentOutcome, Inhibit, TurnFragment
 from engage_hri.schemas.messages import Message
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.generation import pipeline
 from tests.generation import partners as partners_module
 from tests.generation.partners import TABLE, Partners, stage
 
@@ -29,26 +27,22 @@ def refers(*targets: str) -> TurnFragment:
     return TurnFragment(id="show", behaviors=(Speech(id="s", text="Take"), *references))
 
 
-@pytest.fixture(autouse=True)
-def a_pause_at_each_step(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pipeline, "SLICE", 1)
-
-
 class Interruption:
-    """Something that happens as the body answers the question about what comes after the first reference."""
+    """Something that happens while the body takes its time over what comes after the first reference."""
 
     def __init__(self) -> None:
         self.happens: Callable[[], object] = lambda: None
         self.questions = 0
 
-    def estimates(self, *arguments: object, **named: object) -> Callable[[Message], Message]:
+    def estimates(self, *arguments: object, **named: object) -> Callable[[Message], Coroutine[Any, Any, Message]]:
         answer = ORIGINAL(*arguments, **named)  # type: ignore[arg-type]
 
-        def told(question: Message) -> Message:
+        async def told(question: Message) -> Message:
             assert isinstance(question, EstimateBehaviors)
             self.questions += 1
             if self.questions == 2:
                 self.happens()
+                await asyncio.sleep(0.05)
             made: Message = answer(question)
             return made
 
