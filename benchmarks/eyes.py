@@ -21,7 +21,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from engage_hri.schemas.landmarks import FaceLandmarks
+from engage_hri.schemas.perception import FaceLandmarks
 from engage_hri.schemas.recognition import SureLook
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.perception.eyes.config import EyesConfig

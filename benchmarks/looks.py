@@ -14,8 +14,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from engage_hri.schemas.landmarks import FaceLandmarks
-from engage_hri.schemas.perception import HeadPose
+from engage_hri.schemas.perception import FaceLandmarks, HeadPose
 from engage_hri.services.perception.eyes.seeing import Seeing, SeenHead
 from tests.perception.eyes.film_of_looks import EYES, FilmedPerson, filmed, landmarks
 from tests.perception.eyes.judged_looks import WHO, JudgedLooks, judged, told_looks

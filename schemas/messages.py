@@ -18,12 +18,10 @@ from engage_hri.schemas import (
     body_faults,
     fragments,
     keys,
-    landmarks,
     participants,
     perception,
     recognition,
     requests,
-    sound,
     world,
 )
 from engage_hri.schemas.access import LARGEST, check_size
@@ -51,8 +49,8 @@ Message = (
     | perception.ActionBegan | perception.ActionEnded | perception.ActorFound | perception.ActorLost
     | perception.OngoingActions | perception.Utterance | perception.HeadPose | perception.Looked
     | perception.VoiceActivity
-    | sound.SoundFrame
-    | landmarks.FaceLandmarks
+    | perception.SoundFrame
+    | perception.FaceLandmarks
     | world.World
     | recognition.RequestEvent | recognition.EventOutcome | recognition.SignalTurn | recognition.TurnOutcome
     | recognition.ConnectionEvent | recognition.OpenEvents | recognition.Statistics

@@ -162,3 +162,61 @@ class Utterance(Struct, frozen=True, kw_only=True, tag="utterance", omit_default
     to: Annotated[tuple[str, ...], Meta(max_length=MOST_ADDRESSEES)] = ()
     confidence: Probability = 1.0
     finished: Probability | None = None
+
+
+MOST_SAMPLES = 16 * 1024
+"""Bytes of one frame: half a second at 16 kHz."""
+
+
+class SoundFrame(Struct, frozen=True, kw_only=True, tag="sound_frame", omit_defaults=True):
+    """stream: a short piece of sound, one channel, 16 bit, little-endian.
+
+    A frame without samples says that what was told before is not heard from `at` on: a voice was interrupted, or a
+    microphone is off.
+
+    at: when the first sample was picked up, or is to be heard. rate: samples per second. number: counts the frames
+    of this source; where one is left out, a frame was lost.
+    """
+
+    at: Stamp
+    rate: Annotated[int, Meta(ge=4000, le=192_000)]
+    samples: Annotated[bytes, Meta(max_length=MOST_SAMPLES)] = b""
+    number: Annotated[int, Meta(ge=0)] = 0
+
+    def __post_init__(self) -> None:
+        if len(self.samples) % 2:
+            raise ValueError(f"samples of {len(self.samples)} bytes: expected two for each")
+
+
+FACE_POINTS = 468
+"""Points of a face, in the order of the face mesh of MediaPipe, which browsers and Python have alike."""
+EIGHTHS = 8
+"""Steps of a coordinate in one pixel."""
+_BYTES = FACE_POINTS * 3 * 2
+MOST_FACES = 16
+Pixels = Annotated[int, Meta(ge=16, le=4096)]
+
+
+class FacePoints(Struct, frozen=True, kw_only=True, tag=False, omit_defaults=True):
+    """Points of one face in a picture.
+
+    points: x to the right, y down, and depth away from the camera in the same scale, of each point, in eighths of a
+    pixel; 16 bit, little-endian. confidence: that it is a face.
+    """
+
+    points: Annotated[bytes, Meta(min_length=_BYTES, max_length=_BYTES)]
+    confidence: Probability = 1.0
+
+
+class FaceLandmarks(Struct, frozen=True, kw_only=True, tag="face_landmarks", omit_defaults=True):
+    """stream: perception. All faces that a source has found in one picture; none: it has looked, and saw nobody.
+
+    at: when the picture was taken; the source has looked until then. width, height: of the picture, in pixels.
+    over: there was no picture: the source, which people switch on and off, looks no more.
+    """
+
+    at: Stamp
+    width: Pixels
+    height: Pixels
+    faces: Annotated[tuple[FacePoints, ...], Meta(max_length=MOST_FACES)] = ()
+    over: bool = False

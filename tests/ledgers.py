@@ -10,8 +10,7 @@ from engage_hri.schemas.messages import decode, encode
 from engage_hri.schemas.participants import Step, Taken
 from engage_hri.services.bus.interface import Received
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.runtime.again import Again
-from engage_hri.services.runtime.intake import ServiceIntake, StepClock
+from engage_hri.services.runtime.intake import Again, ServiceIntake, StepClock
 
 
 class RecordedLives:

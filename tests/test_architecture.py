@@ -30,8 +30,8 @@ MACHINERY = {"bus", "requests", "runtime", "client", "commandline"}
 PURE_MACHINERY = {
     "services/requests/asking.py", "services/requests/asking_table.py",
     "services/requests/serving.py", "services/requests/serving_table.py",
-    "services/runtime/again.py", "services/runtime/installation.py",
-    "services/runtime/intake.py", "services/runtime/parcels.py",
+    "services/runtime/intake.py", "services/runtime/installation.py",
+    "services/runtime/parcels.py",
     "services/runtime/steps.py",
     "services/client/chunking.py", "services/client/event_stream.py", "services/client/turn_ends.py",
     "services/client/conversation/calls.py", "services/client/conversation/dialects.py",

@@ -15,18 +15,16 @@ from engage_hri.schemas import (
     body_faults,
     faults,
     fragments,
-    landmarks,
     participants,
     perception,
     recognition,
     requests,
-    sound,
     units,
     world,
 )
 
 MODULES: tuple[ModuleType, ...] = (
-    fragments, blocks, behaviors, recognition, perception, landmarks, sound, world, body, body_faults, requests,
+    fragments, blocks, behaviors, recognition, perception, world, body, body_faults, requests,
     faults, participants, units,
 )  # fmt: skip
 

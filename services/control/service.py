@@ -15,9 +15,9 @@ from msgspec import Struct
 from engage_hri.schemas import keys
 from engage_hri.schemas.body_faults import BodyFault, SwitchFaults
 from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.perception import SoundFrame
 from engage_hri.schemas.recognition import SamePeople
 from engage_hri.schemas.requests import Request
-from engage_hri.schemas.sound import SoundFrame
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import COVERED_FOR, World
 from engage_hri.services.bus import journal
@@ -44,8 +44,7 @@ from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.intake import AnswerRequest, PublishMessage, input_of
 from engage_hri.services.runtime.ledger import BusClock, NotedIntake
 from engage_hri.services.runtime.loop import Timer
-from engage_hri.services.runtime.service import Ready
-from engage_hri.services.runtime.settings import tell_settings
+from engage_hri.services.runtime.service import Ready, tell_settings
 
 DEAD_MAN: Seconds = 5.0
 """Time without a message of the requester after which its behaviors end, unless the request names a lease

@@ -8,8 +8,15 @@ from rich.table import Table
 from rich.text import Text
 
 from engage_hri.schemas.units import A_DAY, Seconds, span
-from engage_hri.services.doctor.facts import Cell, EndpointFacts, SystemFacts, matrix
-from engage_hri.services.doctor.findings import Diagnosis, Severity, certificates
+from engage_hri.services.doctor.findings import (
+    Cell,
+    Diagnosis,
+    EndpointFacts,
+    Severity,
+    SystemFacts,
+    certificates,
+    matrix,
+)
 
 GOOD = Text("Nothing is wrong.", style="bold green")
 STYLES: dict[Severity, str] = {"wrong": "bold red", "doubtful": "yellow", "note": "dim"}

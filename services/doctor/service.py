@@ -31,7 +31,7 @@ from engage_hri.services.bus.keyring import HOLDERS, WHO, Keys, Who, read_keys
 from engage_hri.services.bus.zenoh.hub import ZenohHub, open_hub
 from engage_hri.services.bus.zenoh.neighbors import protocols, robots
 from engage_hri.services.bus.zenoh.session import RENDEZVOUS, ROUTER_WITH_KEYS
-from engage_hri.services.doctor.facts import (
+from engage_hri.services.doctor.findings import (
     BodyFacts,
     Certificate,
     EndpointFacts,

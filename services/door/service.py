@@ -11,8 +11,7 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.client.robot import Robot
 from engage_hri.services.door.config import DoorConfig
 from engage_hri.services.door.server import DoorServer
-from engage_hri.services.runtime.service import Ready
-from engage_hri.services.runtime.settings import tell_settings
+from engage_hri.services.runtime.service import Ready, tell_settings
 from engage_hri.services.web.https import server_keys
 from engage_hri.services.web.serving import serving
 from engage_hri.services.web.tokens import kept_token

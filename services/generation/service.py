@@ -36,8 +36,7 @@ from engage_hri.services.requests.ends import News, RequestDesk, Requester
 from engage_hri.services.runtime.intake import AnswerRequest, Input, PublishMessage, TellMistake, input_of
 from engage_hri.services.runtime.ledger import BusClock, NotedIntake
 from engage_hri.services.runtime.loop import Alarm
-from engage_hri.services.runtime.service import Ready
-from engage_hri.services.runtime.settings import tell_settings
+from engage_hri.services.runtime.service import Ready, tell_settings
 
 BODY_PATIENCE: Seconds = 5.0
 """Time that a reference waits for a body to say what motions cost: a body that has just been started needs it.

@@ -41,8 +41,7 @@ from engage_hri.services.realizer.together.live_blocks import LiveBlocks, Past, 
 from engage_hri.services.realizer.together.planning import Planning
 from engage_hri.services.requests.ends import Patience, RequestDesk, Requester, unfinished
 from engage_hri.services.runtime.ledger import NotedInputs
-from engage_hri.services.runtime.service import Ready
-from engage_hri.services.runtime.settings import tell_settings
+from engage_hri.services.runtime.service import Ready, tell_settings
 
 PULSE: Seconds = 1.0
 """Time between two renewals of the requests to the body and to recognition: two may be lost within a

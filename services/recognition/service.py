@@ -25,8 +25,7 @@ from engage_hri.services.runtime.intake import (
     input_of,
 )
 from engage_hri.services.runtime.ledger import BusClock, NotedIntake
-from engage_hri.services.runtime.service import Ready
-from engage_hri.services.runtime.settings import tell_settings
+from engage_hri.services.runtime.service import Ready, tell_settings
 
 T = TypeVar("T")
 

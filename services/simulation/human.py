@@ -19,10 +19,10 @@ from engage_hri.schemas.behaviors import Action, EventKind
 from engage_hri.schemas.blocks import BlockProgress
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.body_faults import BodyFaults
-from engage_hri.schemas.footprints import Side
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, Utterance
 from engage_hri.schemas.recognition import ConnectionEvent, EventState
+from engage_hri.schemas.tables import Side
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.client.people.actions import RECOGNIZING, Utterances, speaking_time
 

@@ -9,8 +9,7 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from engage_hri.schemas.footprints import PiecePose
-from engage_hri.schemas.tables import Form, TableTop, TaskTable
+from engage_hri.schemas.tables import Form, PiecePose, TableTop, TaskTable
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity
 

@@ -7,7 +7,7 @@ import msgspec
 from engage_hri.schemas import keys
 from engage_hri.schemas.participants import BusHealth, ClockOffset, ProcessFacts, Reachable, Status
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.doctor.facts import (
+from engage_hri.services.doctor.findings import (
     BodyFacts,
     EndpointFacts,
     ParticipantFacts,

@@ -13,16 +13,17 @@ from rich.console import Console
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.participants import ClockOffset
-from engage_hri.services.doctor.facts import (
+from engage_hri.services.doctor.findings import (
     HERE,
     BodyFacts,
     Certificate,
+    Diagnosis,
     EndpointFacts,
     ParticipantFacts,
     SystemFacts,
+    findings,
     matrix,
 )
-from engage_hri.services.doctor.findings import Diagnosis, findings
 from engage_hri.services.doctor.report import as_json, report
 from tests.cli.command import Engage, start
 from tests.cli.doctor_facts import AT, NAMES, known, listening, well, with_one

@@ -16,8 +16,7 @@ import numpy as np
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.landmarks import FaceLandmarks
-from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorLost, HeadPose
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorLost, FaceLandmarks, HeadPose
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.perception.eyes.head_pose import head

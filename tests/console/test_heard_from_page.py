@@ -20,8 +20,7 @@ import pytest
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.perception import ActionBegan, ActionEnded, Utterance
-from engage_hri.schemas.sound import SoundFrame
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, SoundFrame, Utterance
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.client.robot import Robot
 from tests.console import browser

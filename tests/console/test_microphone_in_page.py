@@ -17,7 +17,7 @@ import pytest
 from numpy.typing import NDArray
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.sound import SoundFrame
+from engage_hri.schemas.perception import SoundFrame
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.zenoh.hub import open_hub
 from tests.console import browser

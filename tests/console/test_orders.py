@@ -13,8 +13,8 @@ from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.documents import json_codec
 from engage_hri.schemas.faults import InputRefused
-from engage_hri.schemas.footprints import edges, overlap, touches
 from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.tables import edges, overlap, touches
 from engage_hri.schemas.tool import Say
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.console.web.orders import (

@@ -14,8 +14,7 @@ pytest.importorskip("starlette", reason="needs the extra `console`")
 import httpx
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.landmarks import FACE_POINTS, FaceLandmarks, FacePoints
-from engage_hri.schemas.perception import ActionBegan, ActionEnded, HeadPose
+from engage_hri.schemas.perception import FACE_POINTS, ActionBegan, ActionEnded, FaceLandmarks, FacePoints, HeadPose
 from engage_hri.schemas.units import Vector
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub

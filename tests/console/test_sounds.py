@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("starlette", reason="needs the extra `console`")
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.sound import SoundFrame
+from engage_hri.schemas.perception import SoundFrame
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.console.web import links, sounds

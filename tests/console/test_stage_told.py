@@ -11,7 +11,7 @@ import pytest
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.console.web.sessions import RELOADED
 from engage_hri.services.perception.hearing.config import HearingConfig
-from engage_hri.services.runtime.settings import tell_settings
+from engage_hri.services.runtime.service import tell_settings
 from tests.console import browser
 from tests.console.browser import waited
 from tests.console.test_stage import LATER, OUTSIDE, PERSON, STAGE, Place, needs_browser, opened, press, sit

@@ -36,8 +36,7 @@ from engage_hri.services.control.serving.steps import BodyTold, ControlStep, Str
 from engage_hri.services.control.testing import BEHAVIORS, WORLD
 from engage_hri.services.control.torso.body import SimulatedBody
 from engage_hri.services.requests.ends import Requester
-from engage_hri.services.runtime.again import Again
-from engage_hri.services.runtime.intake import AnswerRequest
+from engage_hri.services.runtime.intake import Again, AnswerRequest
 from engage_hri.services.runtime.service import running
 from tests.commanding import command
 from tests.ledgers import RecordedLives, changed_step

@@ -14,8 +14,7 @@ from engage_hri.services.control.contract.body import MouthShape
 from engage_hri.services.control.figure.alive import CHANGE, Mouth
 from engage_hri.services.control.testing import WORLD, Stage, performed
 from engage_hri.services.control.torso.body import SimulatedBody
-from engage_hri.services.control.voice.lips import spelled
-from engage_hri.services.control.voice.timeline import utter
+from engage_hri.services.control.voice.timeline import spelled, utter
 from tests.control.test_alive import TEXT, sampled, shown
 
 

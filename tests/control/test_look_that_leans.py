@@ -3,8 +3,7 @@
 import pytest
 
 from engage_hri.schemas.units import Vector
-from engage_hri.services.control.figure.aiming import Aim, Trunk
-from engage_hri.services.control.figure.course import Course
+from engage_hri.services.control.figure.course import Aim, Course, Trunk
 from engage_hri.services.control.figure.head import NECK, going_to
 
 PLACES: list[Vector] = [(0.7, 0.2, 0.9), (1.0, -0.3, 1.2), (0.6, 0.0, 0.8)]

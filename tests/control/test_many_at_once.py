@@ -8,7 +8,7 @@ import pytest
 
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import kinematics, tracks
-from engage_hri.services.control.figure.aiming import TRUNK, UPRIGHT, Aim, Trunk
+from engage_hri.services.control.figure.course import TRUNK, UPRIGHT, Aim, Trunk
 from engage_hri.services.control.figure.kinematics import (
     CLEARANCE,
     REACH,

@@ -12,7 +12,7 @@ from engage_hri.schemas.body import BodyPose, Estimate, WordTime
 from engage_hri.schemas.documents.prosody import marked_up, spans, unread
 from engage_hri.schemas.world import World
 from engage_hri.services.control.contract.body import MovementAuthority, Progress, Spoke
-from engage_hri.services.control.serving.words_for_voice import estimate_of, progress_of, spoken
+from engage_hri.services.control.serving.live_behavior import estimate_of, progress_of, spoken
 from engage_hri.services.control.torso.body import SimulatedBody
 from tests.random_cases import share_of
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.body import WordSpoken
-from engage_hri.schemas.sound import SoundFrame
+from engage_hri.schemas.perception import SoundFrame
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.bases.composed import Member, composed
 from engage_hri.services.control.bases.driver_guard import GuardedBody

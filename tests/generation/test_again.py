@@ -39,8 +39,7 @@ from engage_hri.services.realizer.service import realize
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.service import recognize
 from engage_hri.services.requests.ends import Requester
-from engage_hri.services.runtime.again import Again
-from engage_hri.services.runtime.intake import AnswerRequest
+from engage_hri.services.runtime.intake import Again, AnswerRequest
 from engage_hri.services.runtime.service import Service, running
 from tests.generation.partners import TABLE
 from tests.ledgers import RecordedLives, changed_step

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.perception import ActionBegan, ActionEnded
-from engage_hri.schemas.sound import SoundFrame
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, SoundFrame
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.voice.outlets import PIECE, SOON

@@ -23,10 +23,8 @@ import numpy as np
 from imageio_ffmpeg import write_frames
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.landmarks import FaceLandmarks
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.perception import ActionBegan
-from engage_hri.schemas.sound import SoundFrame
+from engage_hri.schemas.perception import ActionBegan, FaceLandmarks, SoundFrame
 from engage_hri.schemas.units import Seconds, Stamp, Vector
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.perception.eyes.looking import packed

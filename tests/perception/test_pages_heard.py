@@ -13,8 +13,7 @@ pytest.importorskip("starlette", reason="needs the extra `console`")
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.perception import ActionBegan, ActorFound, ActorLost, Utterance
-from engage_hri.schemas.sound import SoundFrame
+from engage_hri.schemas.perception import ActionBegan, ActorFound, ActorLost, SoundFrame, Utterance
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.people.perceive import perceive

@@ -27,7 +27,7 @@ from engage_hri.services.recognition.service import recognize
 from engage_hri.services.recording.disk import read
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.requests.ends import Requester
-from engage_hri.services.runtime.again import content_of
+from engage_hri.services.runtime.intake import content_of
 from engage_hri.services.runtime.service import serve
 from engage_hri.services.tangram.people.config import SimulationConfig
 from tests.recording.runs import recording_to, tangram

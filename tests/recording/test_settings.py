@@ -25,8 +25,7 @@ from engage_hri.services.realizer.config import RealizerConfig
 from engage_hri.services.recording.disk import read
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.settings import changed, configuration, settings_of
-from engage_hri.services.runtime.service import running, serve
-from engage_hri.services.runtime.settings import HIDDEN, is_secret, shown, tell_settings
+from engage_hri.services.runtime.service import HIDDEN, is_secret, running, serve, shown, tell_settings
 from engage_hri.services.tangram.people.config import SimulationConfig
 from tests.recording.files import recording, sample
 from tests.recording.runs import recording_to

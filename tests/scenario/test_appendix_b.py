@@ -16,7 +16,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import HeadOwner
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent
-from engage_hri.schemas.relations import Relation, relation
+from engage_hri.schemas.tables import Relation, relation
 from engage_hri.schemas.world import World
 from engage_hri.services.reports.action_reports import FACE_GRACE
 from engage_hri.services.runtime.virtual_time import run_virtual

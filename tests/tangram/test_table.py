@@ -4,7 +4,7 @@ from itertools import combinations
 
 import pytest
 
-from engage_hri.schemas.footprints import PiecePose, edges, overlap, poses_touching, touches
+from engage_hri.schemas.tables import PiecePose, edges, overlap, poses_touching, touches
 from engage_hri.schemas.world import Entity
 from engage_hri.services.simulation.still import table_world
 from engage_hri.services.tangram.people.table import Table

@@ -9,7 +9,7 @@ from engage_hri.schemas.behaviors import Speech
 from engage_hri.schemas.tool import Say
 from engage_hri.services.client.chunking import Chunker
 from engage_hri.services.control.contract.body import Spoke
-from engage_hri.services.control.serving.words_for_voice import progress_of, spoken
+from engage_hri.services.control.serving.live_behavior import progress_of, spoken
 from engage_hri.services.control.voice.timeline import uttered
 from engage_hri.services.text.ear import heard, is_spoken, said
 from engage_hri.services.text.marks import Ids, Piece, Reader, problems

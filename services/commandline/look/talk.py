@@ -33,7 +33,7 @@ from engage_hri.services.commandline.shell.roster import ROBOT, complete
 from engage_hri.services.commandline.shell.settings import AT_PAGES, RobotConfig
 from engage_hri.services.console.follow import following
 from engage_hri.services.console.terminal.live import scene_view
-from engage_hri.services.control.bases.error_place import seen_at, words_of
+from engage_hri.services.control.bases.driver_guard import seen_at, words_of
 from engage_hri.services.runtime.installation import extra_command, has_hearing
 from engage_hri.services.runtime.service import running
 

@@ -55,9 +55,17 @@ from engage_hri.services.recognition import intake as recognition
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recording.reading import Recording
 from engage_hri.services.recording.settings import flat, settings_of
-from engage_hri.services.runtime.again import Again, Find, Lack, StepDifference, content_of
 from engage_hri.services.runtime.configuration import read
-from engage_hri.services.runtime.intake import PublishMessage, ServiceIntake, StepClock
+from engage_hri.services.runtime.intake import (
+    Again,
+    Find,
+    Lack,
+    PublishMessage,
+    ServiceIntake,
+    StepClock,
+    StepDifference,
+    content_of,
+)
 from engage_hri.services.runtime.virtual_time import run_virtual
 
 # -- the realizer -------------------------------------------------------------------------------------------------

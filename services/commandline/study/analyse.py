@@ -29,7 +29,7 @@ from engage_hri.services.recognition.statistics.tally import EventTally
 from engage_hri.services.recording.reading import Recording, RecordingTimes, messages, moved
 from engage_hri.services.recording.settings import COLUMNS, LifeSettings, changed, flat, rows, settings_of
 from engage_hri.services.reports.in_force import InForce
-from engage_hri.services.runtime.settings import shown
+from engage_hri.services.runtime.service import shown
 from engage_hri.services.study import summary
 from engage_hri.services.study.hypotheses import BASELINE, HypothesisResult, findings
 from engage_hri.services.study.records import EventRecord, SessionRecord

@@ -14,8 +14,8 @@ from typing import NamedTuple
 from msgspec.structs import replace
 
 from engage_hri.schemas.body import Capabilities, RobotState
-from engage_hri.schemas.footprints import SIDES, corners, overlap, poses_touching
 from engage_hri.schemas.fragments import Claim
+from engage_hri.schemas.tables import SIDES, corners, overlap, poses_touching
 from engage_hri.schemas.units import Meters, Radians, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.console.view import Actor, Scene

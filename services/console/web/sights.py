@@ -21,8 +21,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.landmarks import FACE_POINTS, MOST_FACES, FaceLandmarks, FacePoints
-from engage_hri.schemas.perception import HeadPose
+from engage_hri.schemas.perception import FACE_POINTS, MOST_FACES, FaceLandmarks, FacePoints, HeadPose
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.console.web.links import NONSENSE, TOO_MUCH, PageLinks

@@ -14,7 +14,7 @@ from math import isfinite
 from starlette.websockets import WebSocket
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.sound import SoundFrame
+from engage_hri.schemas.perception import SoundFrame
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.console.web.links import NONSENSE, TOO_MUCH, PageLinks

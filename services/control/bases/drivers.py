@@ -26,8 +26,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.advice import explained
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
 from engage_hri.services.control.bases.composed import Member, composed
-from engage_hri.services.control.bases.driver_guard import GuardedBody
-from engage_hri.services.control.bases.error_place import seen_at, words_of
+from engage_hri.services.control.bases.driver_guard import GuardedBody, seen_at, words_of
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.body import Body
 from engage_hri.services.runtime.installation import BODIES, VOICES, Offer, offers, packages_command, unreadable

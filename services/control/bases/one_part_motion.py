@@ -29,8 +29,7 @@ from engage_hri.schemas.units import Meters, Radians, Seconds, Vector
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.control.bases.moving_parts import MovingParts, Run
-from engage_hri.services.control.bases.walk import WalkingBody
-from engage_hri.services.control.bases.watch import Watch
+from engage_hri.services.control.bases.walk import WalkingBody, Watch
 from engage_hri.services.control.contract.body import (
     BehaviorRefused,
     BodyFailed,

@@ -37,8 +37,9 @@ from engage_hri.schemas.vocabulary import normal
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import expressions, kinematics
-from engage_hri.services.control.figure.aiming import TRUNK, Aim
 from engage_hri.services.control.figure.course import (
+    TRUNK,
+    Aim,
     Course,
     Situation,
     angles,

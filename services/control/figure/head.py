@@ -10,8 +10,7 @@ from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDir
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import choreography, tracks
-from engage_hri.services.control.figure.aiming import NECK, Aim
-from engage_hri.services.control.figure.course import Course, Situation, turning_time
+from engage_hri.services.control.figure.course import NECK, Aim, Course, Situation, turning_time
 from engage_hri.services.control.figure.runs import Run
 from engage_hri.services.control.figure.table_clearance import SHORTEST
 from engage_hri.services.control.figure.tracks import PartTrack

@@ -19,8 +19,7 @@ from engage_hri.schemas.world import World
 from engage_hri.services.control.bases.moving_parts import MovingParts
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import tracks
-from engage_hri.services.control.figure.aiming import TRUNK, UPRIGHT, Aim
-from engage_hri.services.control.figure.course import Course, Situation, arm_time
+from engage_hri.services.control.figure.course import TRUNK, UPRIGHT, Aim, Course, Situation, arm_time
 from engage_hri.services.control.figure.estimates import is_arm
 from engage_hri.services.control.figure.runs import Run
 from engage_hri.services.control.figure.tracks import LIFTS, PartTrack, are_clear, lifted

@@ -18,8 +18,7 @@ from engage_hri.services.control.contract.body import MovementAuthority
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.contract.variability import Deviations
 from engage_hri.services.control.figure import choreography, head, kinematics, tracks
-from engage_hri.services.control.figure.aiming import NECK, TRUNK, Aim
-from engage_hri.services.control.figure.course import Course, Situation, return_time
+from engage_hri.services.control.figure.course import NECK, TRUNK, Aim, Course, Situation, return_time
 from engage_hri.services.control.figure.estimates import Added, going_home, motion_estimate
 from engage_hri.services.control.figure.head import Fixation
 from engage_hri.services.control.figure.repertoire import Repertoire

@@ -15,8 +15,7 @@ from engage_hri.schemas.body import BodyPose, JointLimit
 from engage_hri.schemas.units import Meters, Radians, Seconds
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import kinematics
-from engage_hri.services.control.figure.aiming import NECK, TRUNK, UPRIGHT, Aim
-from engage_hri.services.control.figure.course import return_time, turning_time
+from engage_hri.services.control.figure.course import NECK, TRUNK, UPRIGHT, Aim, return_time, turning_time
 from engage_hri.services.control.motion.motion import Motion
 from engage_hri.services.control.motion.path import Array, JointMotion, Leg, Path
 from engage_hri.services.control.motion.track import Track, Trunk

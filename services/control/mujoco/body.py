@@ -20,7 +20,7 @@ from engage_hri.schemas.body_faults import BodyFault, refuse
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.schemas.world import World
-from engage_hri.services.control.bases.watch import Off, Watch, farthest, nearest
+from engage_hri.services.control.bases.walk import Off, Watch, farthest, nearest
 from engage_hri.services.control.config import ControlConfig, Variability
 from engage_hri.services.control.contract.body import Body, BodyFailed, Idle, MovementAuthority, Progress
 from engage_hri.services.control.figure import tracks

@@ -18,7 +18,7 @@ from engage_hri.schemas.world import World
 from engage_hri.services.control.bases import moving_parts
 from engage_hri.services.control.bases.linked import GAP
 from engage_hri.services.control.bases.moving_parts import Clock, MovingParts
-from engage_hri.services.control.bases.watch import Off, Watch, farthest, nearest, settling
+from engage_hri.services.control.bases.walk import Off, Watch, farthest, nearest, settling
 from engage_hri.services.control.contract.body import MovementAuthority
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure.course import Course

@@ -69,8 +69,7 @@ from engage_hri.services.control.contract.body import AbortMode, Arrived, Progre
 from engage_hri.services.control.contract.refusals import refusal
 from engage_hri.services.control.contract.variability import Deviations, is_lost
 from engage_hri.services.control.serving import effects, steps
-from engage_hri.services.control.serving.live_behavior import LiveBehavior, Status
-from engage_hri.services.control.serving.words_for_voice import progress_of
+from engage_hri.services.control.serving.live_behavior import LiveBehavior, Status, progress_of
 from engage_hri.services.reports.ongoing_actions import OngoingActionTracker
 from engage_hri.services.reports.same_people import PeopleNames
 from engage_hri.services.requests.serving import HoldRequest

@@ -23,7 +23,7 @@ from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.contract.calibration import Calibration
 from engage_hri.services.control.serving.intake import ControlIntake
-from engage_hri.services.control.serving.words_for_voice import estimate_of, spoken, spoken_items
+from engage_hri.services.control.serving.live_behavior import estimate_of, spoken, spoken_items
 from engage_hri.services.runtime.loop import InTurns
 from engage_hri.services.runtime.steps import Steps
 

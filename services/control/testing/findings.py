@@ -34,7 +34,7 @@ from engage_hri.schemas.body import BodyPose, Ray
 from engage_hri.schemas.faults import EngageError
 from engage_hri.schemas.references import type_name
 from engage_hri.schemas.units import Meters, Radians, Seconds, Vector
-from engage_hri.services.control.bases.error_place import place_of, words_of
+from engage_hri.services.control.bases.driver_guard import place_of, words_of
 from engage_hri.services.control.contract.body import BehaviorRefused, BodyFailed
 from engage_hri.services.runtime.virtual_time import Deadlock, TimeRanOut
 

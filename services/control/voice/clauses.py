@@ -23,9 +23,8 @@ from numpy.typing import NDArray
 from engage_hri.schemas.text import Token, tokens
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.body import MouthShape
-from engage_hri.services.control.voice.lips import lips, loud
 from engage_hri.services.control.voice.synthesis import Heard, Phrase, Said, Synthesizer, refused
-from engage_hri.services.control.voice.timeline import PAUSE, Word, natural
+from engage_hri.services.control.voice.timeline import PAUSE, Word, lips, loud, natural
 
 Samples = NDArray[np.int16]
 

@@ -31,9 +31,8 @@ from engage_hri.services.control.contract.body import (
     Spoke,
 )
 from engage_hri.services.control.voice.clauses import Clause
-from engage_hri.services.control.voice.lips import spelled
 from engage_hri.services.control.voice.outlets import Outlet
-from engage_hri.services.control.voice.timeline import Piece, Utterance, Word, utter, uttered
+from engage_hri.services.control.voice.timeline import Piece, Utterance, Word, spelled, utter, uttered
 
 OnLips = Callable[[Sequence[MouthShape]], None]
 CHECK: Seconds = 0.05

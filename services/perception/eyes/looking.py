@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.landmarks import EIGHTHS, FACE_POINTS, FaceLandmarks, FacePoints
+from engage_hri.schemas.perception import EIGHTHS, FACE_POINTS, FaceLandmarks, FacePoints
 from engage_hri.schemas.units import Probability
 from engage_hri.services.perception.eyes.config import EyesConfig
 from engage_hri.services.perception.pictures import PictureSettings

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.landmarks import FaceLandmarks
+from engage_hri.schemas.perception import FaceLandmarks
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import Bus, Subscription

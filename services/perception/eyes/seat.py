@@ -12,7 +12,7 @@ from collections.abc import Iterable
 import numpy as np
 from msgspec.structs import replace
 
-from engage_hri.schemas.landmarks import FaceLandmarks, FacePoints
+from engage_hri.schemas.perception import FaceLandmarks, FacePoints
 from engage_hri.schemas.units import Seconds, Vector
 from engage_hri.services.perception.eyes.camera import SeatCamera
 from engage_hri.services.perception.eyes.config import EyesConfig

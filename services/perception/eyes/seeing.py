@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engage_hri.schemas.landmarks import FaceLandmarks
+from engage_hri.schemas.perception import FaceLandmarks
 from engage_hri.schemas.units import Meters, Radians, Seconds, Vector
 from engage_hri.services.perception.eyes.camera import SeatCamera, StatedCamera
 from engage_hri.services.perception.eyes.config import EyesConfig

@@ -12,8 +12,8 @@ from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.landmarks import FaceLandmarks
 from engage_hri.schemas.participants import PeerAlive
+from engage_hri.schemas.perception import FaceLandmarks
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import Bus, Subscription
@@ -30,8 +30,7 @@ from engage_hri.services.perception.eyes.watching import (
     Watching,
 )
 from engage_hri.services.runtime.packages import data_folder
-from engage_hri.services.runtime.service import Ready
-from engage_hri.services.runtime.settings import tell_settings
+from engage_hri.services.runtime.service import Ready, tell_settings
 
 LOOK_AROUND: Seconds = 0.5
 """Time in which the world, if anybody tells it, is known."""

@@ -20,7 +20,7 @@ import msgspec
 from msgspec.structs import replace
 
 from engage_hri.schemas.faults import EngageError, Fault, InputRefused
-from engage_hri.schemas.landmarks import FaceLandmarks
+from engage_hri.schemas.perception import FaceLandmarks
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.perception.child import (
     PackedMessages,

@@ -4,7 +4,7 @@ import numpy as np
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.sound import SoundFrame
+from engage_hri.schemas.perception import SoundFrame
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.perception.hearing.company import HeardPeople, HearingFaults

@@ -8,8 +8,7 @@ from engage_hri.services.perception.hearing.device import DeviceEars
 from engage_hri.services.perception.hearing.intake import HearingIntake
 from engage_hri.services.perception.hearing.pages import PageEars
 from engage_hri.services.perception.hearing.speeches import Speeches, is_cancelling
-from engage_hri.services.runtime.service import Ready
-from engage_hri.services.runtime.settings import tell_settings
+from engage_hri.services.runtime.service import Ready, tell_settings
 
 
 async def hear(bus: Bus, ready: Ready, config: HearingConfig) -> None:

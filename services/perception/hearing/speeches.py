@@ -25,9 +25,9 @@ from engage_hri.schemas.perception import (
     ActorFound,
     ActorLost,
     HeadPose,
+    SoundFrame,
     Utterance,
 )
-from engage_hri.schemas.sound import SoundFrame
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.perception.hearing.company import HeardPeople, HearingFaults

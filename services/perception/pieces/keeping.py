@@ -19,8 +19,7 @@ from statistics import median
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.footprints import PiecePose
-from engage_hri.schemas.tables import Form, TaskTable
+from engage_hri.schemas.tables import Form, PiecePose, TaskTable
 from engage_hri.schemas.units import Meters, Probability, Radians, Seconds
 from engage_hri.schemas.world import Entity
 from engage_hri.services.perception.pieces.spotting import HEIGHT, SpottedHand, SpottedPiece, SpottedPieces

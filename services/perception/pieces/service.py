@@ -12,8 +12,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.relations import Relation, relations
-from engage_hri.schemas.tables import TaskTable
+from engage_hri.schemas.tables import Relation, TaskTable, relations
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus import journal
@@ -25,8 +24,7 @@ from engage_hri.services.perception.pieces.config import PiecesConfig
 from engage_hri.services.perception.pieces.keeping import COVERED, HandKeeper, PieceKeeper
 from engage_hri.services.perception.pieces.spotting import SpottedPieces, table_settings
 from engage_hri.services.perception.pieces.watching import TABLES_SEEN
-from engage_hri.services.runtime.service import Ready
-from engage_hri.services.runtime.settings import tell_settings
+from engage_hri.services.runtime.service import Ready, tell_settings
 
 AGAIN: Seconds = 2.0
 """Time after which a device is tried again that gave no picture."""

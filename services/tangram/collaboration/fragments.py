@@ -18,9 +18,8 @@ from engage_hri.schemas.behaviors import (
     Speech,
     SpeechOption,
 )
-from engage_hri.schemas.footprints import Side
 from engage_hri.schemas.fragments import TurnFragment, TurnStatus
-from engage_hri.schemas.relations import Relation
+from engage_hri.schemas.tables import Relation, Side
 from engage_hri.services.tangram.table import TangramTable
 
 MANIPULATION: tuple[Action, ...] = ("act", "speak", "nod", "shake")

@@ -12,10 +12,9 @@ from typing import TypeVar, cast
 
 from msgspec import Struct
 
-from engage_hri.schemas.footprints import Side
 from engage_hri.schemas.fragments import FragmentOutcome, TurnFragment
 from engage_hri.schemas.recognition import EngagementLevel
-from engage_hri.schemas.relations import Relation
+from engage_hri.schemas.tables import Relation, Side
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.schemas.world import Entity
 from engage_hri.services.tangram.collaboration.config import CollaborationConfig

@@ -16,8 +16,7 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.client.feeds import Feed
 from engage_hri.services.client.robot import Robot
 from engage_hri.services.reports.ongoing_actions import ActionEvent
-from engage_hri.services.runtime.service import Ready
-from engage_hri.services.runtime.settings import tell_settings
+from engage_hri.services.runtime.service import Ready, tell_settings
 from engage_hri.services.tangram.collaboration import plans
 from engage_hri.services.tangram.collaboration.config import CollaborationConfig
 from engage_hri.services.tangram.collaboration.host import host

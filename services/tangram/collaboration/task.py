@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable
 
 from msgspec import Struct
 
-from engage_hri.schemas.relations import Relation, relation, relations
+from engage_hri.schemas.tables import Relation, relation, relations
 from engage_hri.schemas.world import Entity
 from engage_hri.services.tangram.collaboration.pieces_in_view import TRUSTED
 from engage_hri.services.tangram.table import TangramTable

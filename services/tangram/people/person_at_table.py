@@ -9,8 +9,8 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 
 from engage_hri.schemas.body import Ray, RobotSeen
-from engage_hri.schemas.footprints import PiecePose, overlap, poses_touching
 from engage_hri.schemas.messages import Message
+from engage_hri.schemas.tables import PiecePose, overlap, poses_touching
 from engage_hri.schemas.units import Seconds, Stamp, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.client.people.actions import PersonActions

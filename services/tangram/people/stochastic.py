@@ -18,9 +18,9 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.body import WordSpoken
-from engage_hri.schemas.footprints import SIDES, poses_touching
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import ActionBegan, ActionEnded
+from engage_hri.schemas.tables import SIDES, poses_touching
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.simulation.chance import Chance, Delays
 from engage_hri.services.simulation.human import (

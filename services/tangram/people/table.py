@@ -10,7 +10,7 @@ from typing import Literal
 import msgspec
 from msgspec import Struct
 
-from engage_hri.schemas.footprints import PiecePose
+from engage_hri.schemas.tables import PiecePose
 from engage_hri.schemas.units import Meters, Seconds, Vector
 from engage_hri.schemas.world import Entity
 from engage_hri.services.tangram.table import TangramTable

@@ -12,8 +12,7 @@ from engage_hri.schemas.behaviors import FaceLexeme, FaceShift, Gaze, Head, Pose
 from engage_hri.services.control.bases.drivers import made
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.body import Reached
-from engage_hri.services.control.reachy_mini.body import ReachyMini
-from engage_hri.services.control.reachy_mini.idling import LEAN, SWAY
+from engage_hri.services.control.reachy_mini.body import LEAN, SWAY, ReachyMini
 from engage_hri.services.control.testing import WORLD, Stage, performed
 from tests.control.reachy_mini.fake import HOME, FakeDaemon
 from tests.control.reachy_mini.limits import too_much

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from engage_hri.schemas.behaviors import FaceLexeme, Gaze, GazeShift, Head, Posture, PostureShift
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.control.bases.watch import settling
+from engage_hri.services.control.bases.walk import settling
 from engage_hri.services.control.contract.body import BodyFailed, Reached
 from engage_hri.services.control.motion.path import JointMotion, resting
 from engage_hri.services.control.reachy_mini import joints

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.landmarks import FaceLandmarks
+from engage_hri.schemas.perception import FaceLandmarks
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.perception.eyes.camera import StatedCamera
 from engage_hri.services.perception.eyes.head_pose import average_face

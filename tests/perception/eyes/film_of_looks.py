@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engage_hri.schemas.landmarks import FaceLandmarks
+from engage_hri.schemas.perception import FaceLandmarks
 from engage_hri.schemas.units import Seconds, Stamp, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.perception.eyes.config import EyesConfig

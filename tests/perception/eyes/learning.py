@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engage_hri.schemas.landmarks import FACE_POINTS
+from engage_hri.schemas.perception import FACE_POINTS
 from engage_hri.services.perception.eyes import head_pose
 from engage_hri.services.perception.eyes.head_pose import AverageFace, solved, yaw_pitch
 from engage_hri.services.perception.eyes.looking import Floats

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from aiohttp import web
 
-from engage_hri.schemas.landmarks import FACE_POINTS
+from engage_hri.schemas.perception import FACE_POINTS
 from engage_hri.services.perception.eyes.looking import Floats
 from tests.console import browser
 from tests.perception.eyes.drawing import Picture

@@ -13,8 +13,7 @@ import pytest
 from engage_hri import embedded
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.landmarks import FaceLandmarks
-from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, FaceLandmarks, HeadPose
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.perception.eyes import service

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from engage_hri.schemas.landmarks import FACE_POINTS
+from engage_hri.schemas.perception import FACE_POINTS
 from engage_hri.services.perception.eyes.head_pose import LOWER_LIP, average_face, head, turn, yaw_pitch
 from engage_hri.services.perception.eyes.looking import packed, unpacked
 from tests.perception.eyes.faces import FOCAL, HEIGHT, WIDTH, points

@@ -11,8 +11,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.landmarks import FaceLandmarks
-from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, HeadPose
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, FaceLandmarks, HeadPose
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub

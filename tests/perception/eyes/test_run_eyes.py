@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.landmarks import FaceLandmarks
-from engage_hri.schemas.perception import ActorLost, HeadPose
+from engage_hri.schemas.perception import ActorLost, FaceLandmarks, HeadPose
 from engage_hri.services.bus.zenoh.hub import open_hub
 from engage_hri.services.runtime.service import running
 from tests.bus.places import free_endpoint

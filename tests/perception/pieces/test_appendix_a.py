@@ -6,8 +6,7 @@ from itertools import combinations
 import cv2
 import numpy as np
 
-from engage_hri.schemas.footprints import PiecePose
-from engage_hri.schemas.relations import relations
+from engage_hri.schemas.tables import PiecePose, relations
 from engage_hri.services.tangram.collaboration.task import Goal
 from tests.perception.pieces import appendix_a
 from tests.perception.pieces.tables import GOALS, TABLE, Pose, corners, layout

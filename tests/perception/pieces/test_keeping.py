@@ -6,8 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from engage_hri.schemas.footprints import PiecePose
-from engage_hri.schemas.relations import Relation, relations
+from engage_hri.schemas.tables import PiecePose, Relation, relations
 from engage_hri.schemas.units import Stamp
 from engage_hri.schemas.world import Entity
 from engage_hri.services.perception.pieces.keeping import COVERED, PieceKeeper

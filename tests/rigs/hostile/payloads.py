@@ -40,12 +40,12 @@ from engage_hri.schemas.perception import (
     HeadPose,
     Looked,
     OngoingActions,
+    SoundFrame,
     Utterance,
     VoiceActivity,
 )
 from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, OpenEvents, Statistics, TurnOutcome
 from engage_hri.schemas.requests import Cancel, KeepAlive, Request
-from engage_hri.schemas.sound import SoundFrame
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from tests.rigs.hostile.chance import Chance, happens

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from engage_hri.schemas.relations import Relation, relation
+from engage_hri.schemas.tables import Relation, relation
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.tangram.collaboration.pieces_in_view import PiecesInView, has_been_placed
 from engage_hri.services.tangram.collaboration.task import Instruction, check

@@ -6,9 +6,9 @@ import pytest
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import Gaze, Reference, Speech
-from engage_hri.schemas.footprints import poses_touching
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.recognition import EngagementLevel
+from engage_hri.schemas.tables import poses_touching
 from engage_hri.schemas.world import Entity
 from engage_hri.services.tangram.collaboration.config import CollaborationConfig
 from engage_hri.services.tangram.collaboration.plans import (

@@ -7,8 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from engage_hri.schemas.footprints import PiecePose, poses_touching
-from engage_hri.schemas.relations import Relation, relation, relations
+from engage_hri.schemas.tables import PiecePose, Relation, poses_touching, relation, relations
 from engage_hri.schemas.world import Entity
 from engage_hri.services.tangram.collaboration.pieces_in_view import has_been_placed
 from engage_hri.services.tangram.collaboration.task import Goal, Instruction, check

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engage_hri.schemas.footprints import PiecePose
+from engage_hri.schemas.tables import PiecePose
 from engage_hri.services.tangram.people.table import PieceRested, Table
 from engage_hri.services.tangram.table import tangram_table
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.landmarks import FACE_POINTS
+from engage_hri.schemas.perception import FACE_POINTS
 from engage_hri.schemas.units import Probability
 from engage_hri.services.perception.eyes.looking import Floats, missing
 from engage_hri.services.runtime.parcels import DETECTOR, MESH

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from engage_hri.schemas.landmarks import FaceLandmarks
+from engage_hri.schemas.perception import FaceLandmarks
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.perception.eyes.looking import LandmarkSource, SourceSettings, packed
 from engage_hri.services.perception.eyes.sources.litert import FaceFinder

@@ -6,7 +6,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from engage_hri.schemas.faults import Fault, InputRefused
-from engage_hri.schemas.landmarks import FaceLandmarks
+from engage_hri.schemas.perception import FaceLandmarks
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.perception.eyes.looking import LandmarkSource, SourceSettings, missing
 
