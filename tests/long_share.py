@@ -33,7 +33,6 @@ LONG = {
     "control/test_told_sound.py": "a synthesizer is a process",
     "perception/test_own_voice.py": "minutes of sound through a filter and a detector",
     "control/test_voice_recognized.py": "eSpeak NG speaks, and a recognizer listens",
-    "control/mujoco/test_described_contract.py": "another robot on the driver that test_mujoco_contract.py has",
     "scenario/test_raw_perception.py": "whole tasks seen by cameras; recognition/ has the parts",
     "recording/test_commands_on_damage.py": "each command on each damage; test_damage.py has what reading finds",
     "scenario/test_on_physics.py": "a whole task in physics; test_appendix_b.py has it on the simulated torso",

@@ -8,7 +8,7 @@ LONGEST = (
     "docs/test_pages.py", "cli/test_check_body.py", "console/test_window.py", "judge/test_judge.py",
     "control/mujoco/test_mujoco_contract.py", "conformance/test_conformance.py", "control/test_contract.py",
     "cli/test_processes.py", "recording/test_again.py", "scenario/test_appendix_b.py", "lab/test_lab.py",
-    "control/mujoco/test_described_contract.py", "lab/test_doctor.py", "control/reachy_mini/test_contract.py",
+    "lab/test_doctor.py", "control/reachy_mini/test_contract.py",
     "recording/test_in_the_window.py", "scenario/test_raw_perception.py", "docs/test_site.py",
     "lab/test_heal.py", "scenario/test_on_physics.py",
     "control/test_espeak.py", "hostile/test_attacks.py", "cli/test_recordings.py",

@@ -35,7 +35,7 @@ from engage_hri.services.control.contract.body import (
 )
 from engage_hri.services.control.contract.calibration import calibrated
 from engage_hri.services.control.contract.refusals import VOICE_ADVICE
-from engage_hri.services.control.serving import effects, steps
+from engage_hri.services.control.serving import steps
 from engage_hri.services.control.serving.intake import ControlIntake
 from engage_hri.services.control.serving.live_behavior import sound
 from engage_hri.services.control.serving.questions import Questions
@@ -188,7 +188,7 @@ class _Control:
             self._carry_out(output)
 
     def _undone(self, output: Struct, fault: Fault) -> None:
-        if isinstance(output, effects.BeginBehavior):
+        if isinstance(output, steps.BeginBehavior):
             self._take(steps.StreamEnded(request=output.request.id, how="broken", fault=fault))
 
     def _carry_out(self, output: Struct) -> None:
@@ -197,38 +197,38 @@ class _Control:
                 self._bus.publish(key, message)
             case AnswerRequest(answer=answer):
                 self.desk.answer(answer)
-            case effects.Alert(fault=fault):
+            case steps.Alert(fault=fault):
                 self._warn(fault)
-            case effects.Reassure(text=text):
+            case steps.Reassure(text=text):
                 self._reassure(text)
-            case effects.ShowWorld(world=world):
+            case steps.ShowWorld(world=world):
                 self._body.see(world)
                 self._look()
                 if self._body.state().moving:
                     self._shown.look_soon()
-            case effects.PlayFaults(request=request, faults=faults):
+            case steps.PlayFaults(request=request, faults=faults):
                 self._play(request, faults)
-            case effects.BeginBehavior():
+            case steps.BeginBehavior():
                 self._begin(output)
-            case effects.GiveAuthority(request=id, through=through, pace=pace):
+            case steps.GiveAuthority(request=id, through=through, pace=pace):
                 authority = self._streams[id].authority
                 authority.set_pace({planned.sync: self._bus.local(planned.at) for planned in pace})
                 authority.extend(through)
-            case effects.HoldBehavior(request=id, is_held=is_held):
+            case steps.HoldBehavior(request=id, is_held=is_held):
                 authority = self._streams[id].authority
                 authority.hold() if is_held else authority.go_on()
-            case effects.RevokeAuthority(request=id, how=how):
+            case steps.RevokeAuthority(request=id, how=how):
                 self._streams[id].is_revoked = True
                 self._streams[id].authority.revoke(how)
-            case effects.LeaveStream(request=id, is_cut_off=is_cut_off):
+            case steps.LeaveStream(request=id, is_cut_off=is_cut_off):
                 self._streams[id].leave(is_cut_off=is_cut_off)
-            case effects.TakeHome(request=id, parts=parts, why=why):
+            case steps.TakeHome(request=id, parts=parts, why=why):
                 way = self._tasks.create_task(self._go_home(id, parts, why), name=f"home {why}")
                 if id:
                     self._homeward[id] = way
                     way.add_done_callback(lambda _: self._homeward.pop(id, None))
                 self._shown.look_soon()
-            case effects.StopHome(request=id):
+            case steps.StopHome(request=id):
                 self._homeward[id].cancel()
 
     def _warn(self, fault: Fault) -> None:
@@ -248,7 +248,7 @@ class _Control:
 
     # -- what the body does -------------------------------------------------------------------------------------
 
-    def _begin(self, begun: effects.BeginBehavior) -> None:
+    def _begin(self, begun: steps.BeginBehavior) -> None:
         request = begun.request
         pace = {planned.sync: self._bus.local(planned.at) for planned in request.pace}
         stream = _Stream(MovementAuthority(request.behavior, request.through, pace))
@@ -262,7 +262,7 @@ class _Control:
             stream.is_revoked = True
             self._take(steps.AuthorityRevoked(request=id, how=how))
 
-    async def _perform(self, begun: effects.BeginBehavior, stream: _Stream) -> None:
+    async def _perform(self, begun: steps.BeginBehavior, stream: _Stream) -> None:
         """Let the driver perform a behavior, and pass on what it tells."""
         id, label = begun.request.id, f"{begun.request.block}:{begun.request.behavior.id}"
         ended = steps.StreamEnded(request=id)

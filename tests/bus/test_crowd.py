@@ -1,8 +1,8 @@
 """Who has too many links or tokens at a router: counted by certificate, cut at the bound, let in again later."""
 
 from engage_hri.schemas.access import Holder
+from engage_hri.services.bus.zenoh.links import Link
 from engage_hri.services.bus.zenoh.router import BANNED, MOST_LINKS, MOST_TOKENS, MOST_UNREAD, Crowd
-from engage_hri.services.bus.zenoh.volume import Link
 
 ALICE = Holder(robot="robot", role="manager", name="alice")
 BOB = Holder(robot="robot", role="manager", name="bob")

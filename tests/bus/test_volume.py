@@ -8,10 +8,10 @@ import pytest
 import zenoh
 
 from engage_hri.schemas.access import LOUD, LOUD_ROBOT
-from engage_hri.services.bus.zenoh import volume
+from engage_hri.services.bus.zenoh import links
+from engage_hri.services.bus.zenoh.links import EXCUSED, FULL, UNREAD, Unread, Volume, Volumes, sockets, volumes
 from engage_hri.services.bus.zenoh.router import routing
 from engage_hri.services.bus.zenoh.session import open_session
-from engage_hri.services.bus.zenoh.volume import EXCUSED, FULL, UNREAD, Unread, Volume, Volumes, sockets, volumes
 from tests.bus.places import PATIENCE, free_endpoint
 
 NAMES = {"a": "robot/observer/viewer", "c": "robot/control/control"}
@@ -45,9 +45,9 @@ def test_sockets_of_other_kinds_are_passed_over() -> None:
 
 
 def test_an_address_of_a_local_link_is_spelled_with_its_card_as_zenoh_does() -> None:
-    assert volume._place(("fe80::1", 41882, 0, 3)) == "[fe80::1%3]:41882"
-    assert volume._place(("::1", 7447, 0, 0)) == "[::1]:7447"
-    assert volume._place(("127.0.0.1", 7447)) == "127.0.0.1:7447"
+    assert links._place(("fe80::1", 41882, 0, 3)) == "[fe80::1%3]:41882"
+    assert links._place(("::1", 7447, 0, 0)) == "[::1]:7447"
+    assert links._place(("127.0.0.1", 7447)) == "127.0.0.1:7447"
 
 
 def test_a_full_link_of_which_nothing_is_read_is_to_end_and_one_that_is_read_slowly_is_not() -> None:

@@ -30,7 +30,7 @@ from engage_hri.services.control.contract.body import (
     Reached,
 )
 from engage_hri.services.control.service import embody
-from engage_hri.services.control.serving import effects
+from engage_hri.services.control.serving import steps
 from engage_hri.services.control.serving.intake import ControlIntake
 from engage_hri.services.control.serving.steps import BodyTold, ControlStep, StreamEnded
 from engage_hri.services.control.testing import BEHAVIORS, WORLD
@@ -183,17 +183,17 @@ def each_behavior_ends_once(again: Again) -> None:
     live, ended = set[str](), Counter[str]()
     for effect in again.outputs:
         match effect:
-            case effects.BeginBehavior(request=request):
+            case steps.BeginBehavior(request=request):
                 assert request.id not in live
                 live.add(request.id)
             case AnswerRequest(answer=BehaviorOutcome(id=id) | Refused(id=id)):
                 live.discard(id)
                 ended[id] += 1
             case (
-                effects.GiveAuthority(request=id)
-                | effects.HoldBehavior(request=id)
-                | effects.RevokeAuthority(request=id)
-                | effects.LeaveStream(request=id)
+                steps.GiveAuthority(request=id)
+                | steps.HoldBehavior(request=id)
+                | steps.RevokeAuthority(request=id)
+                | steps.LeaveStream(request=id)
             ):
                 assert id in live
     assert set(ended.values()) == {1}

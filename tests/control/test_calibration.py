@@ -30,8 +30,7 @@ from engage_hri.schemas.faults import InputRefused
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import Robot
-from engage_hri.services.control.calibrating.fitting import Fit, fit
-from engage_hri.services.control.calibrating.measuring import OTHER_ROWS, SimulatedEyes, marks, measured
+from engage_hri.services.control.calibrating import OTHER_ROWS, Fit, SimulatedEyes, fit, marks, measured
 from engage_hri.services.control.config import ControlConfig, Miscalibrated, Variability
 from engage_hri.services.control.contract.calibration import Calibration, calibrated, read, written
 from engage_hri.services.control.service import embody

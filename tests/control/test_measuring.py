@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from engage_hri.schemas.body_faults import BodyFault
-from engage_hri.services.control.calibrating.measuring import SimulatedEyes, marks, measured
+from engage_hri.services.control.calibrating import SimulatedEyes, marks, measured
 from engage_hri.services.control.contract.body import BodyFailed
 from engage_hri.services.control.torso.body import SimulatedBody
 

@@ -1,7 +1,7 @@
 """A router: a process that belongs to no robot, and passes on what the processes of all machines send one another.
 
 With keys it lets in only whom it knows, and passes on only what the table of access allows. What it cannot forbid,
-for it is a question of number, it bounds (`Crowd`) or tells (`volume.py`).
+for it is a question of number, it bounds (`Crowd`) or tells (`links.py`).
 """
 
 import asyncio
@@ -21,10 +21,9 @@ from engage_hri.services.bus.interface import LOG
 from engage_hri.services.bus.keyring import Expiry, Keys
 from engage_hri.services.bus.zenoh.bridge import LoopBridge
 from engage_hri.services.bus.zenoh.denials import LEVELS
-from engage_hri.services.bus.zenoh.links import Forgotten
+from engage_hri.services.bus.zenoh.links import SPAN, Forgotten, Link, Unread, Volumes, end, place, volumes
 from engage_hri.services.bus.zenoh.rules import access_control, paced
 from engage_hri.services.bus.zenoh.session import ROUTER_STALL_US, STALL, encrypted, open_router
-from engage_hri.services.bus.zenoh.volume import SPAN, Link, Unread, Volumes, end, place, volumes
 
 ANSWER: Seconds = 1.0
 """Time that a question of the router itself has. There is nobody who would answer."""

@@ -38,7 +38,7 @@ LEASE_MS = 2000
 STALL_US = 200_000
 """Time that a full link may stall `put`, and so the loop, before it is closed. Zenoh's default is 5 s."""
 ROUTER_STALL_US = 400_000
-"""The same in a router with keys, which ends such links itself, sooner (volume.py). Once Zenoh has begun to close a
+"""The same in a router with keys, which ends such links itself, sooner (links.py). Once Zenoh has begun to close a
 link that nobody reads, nothing ends that, and each message for it halts whoever sends it."""
 STALL = "transport/link/tx/queue/congestion_control/block/wait_before_close"
 RUST_PLACE = re.compile(r" at /\S+\.rs:\d+\.?")

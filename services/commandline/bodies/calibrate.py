@@ -18,8 +18,16 @@ from engage_hri.services.commandline.shell.options import Configured
 from engage_hri.services.commandline.shell.outputs import ResultFile
 from engage_hri.services.commandline.shell.process import DONE, run, typed
 from engage_hri.services.commandline.shell.settings import RobotConfig
-from engage_hri.services.control.calibrating.fitting import Fit, Measurement, fit
-from engage_hri.services.control.calibrating.measuring import OTHER_ROWS, Eyes, SimulatedEyes, marks, measured
+from engage_hri.services.control.calibrating import (
+    OTHER_ROWS,
+    Eyes,
+    Fit,
+    Measurement,
+    SimulatedEyes,
+    fit,
+    marks,
+    measured,
+)
 from engage_hri.services.control.contract.body import Body, BodyState
 from engage_hri.services.control.contract.calibration import PARTS, WIDEST, Calibration, written
 from engage_hri.services.perception.attached import AttachedCamera

@@ -68,7 +68,7 @@ from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.body import AbortMode, Arrived, Progress, Reached, Revocation, Spoke
 from engage_hri.services.control.contract.refusals import refusal
 from engage_hri.services.control.contract.variability import Deviations, is_lost
-from engage_hri.services.control.serving import effects, steps
+from engage_hri.services.control.serving import steps
 from engage_hri.services.control.serving.live_behavior import LiveBehavior, Status, progress_of
 from engage_hri.services.reports.ongoing_actions import OngoingActionTracker
 from engage_hri.services.reports.same_people import PeopleNames
@@ -111,7 +111,7 @@ class ControlIntake:
         self._actions = ActionReporter(robot, clock)
         self._ongoing = OngoingActionTracker()
         self._now: Seconds = 0.0
-        self._outputs: list[effects.Effect] = []
+        self._outputs: list[steps.Effect] = []
 
     @property
     def deadline(self) -> Seconds | None:
@@ -122,7 +122,7 @@ class ControlIntake:
         """Estimate of a behavior that no body is asked about; None: it is to be asked."""
         return refusal(behavior, self._able, self._config.no_point_zones, self.world)
 
-    def advance(self, now: Seconds) -> list[effects.Effect]:
+    def advance(self, now: Seconds) -> list[steps.Effect]:
         """Take all steps that are due by now."""
         self._now = now
         for live in [*self._live.values()]:
@@ -130,7 +130,7 @@ class ControlIntake:
                 self._give_up(live) if live.is_broken_off else self._break_off(live)
         return self._take()
 
-    def take(self, input: Input[steps.ControlStep], now: Seconds) -> list[effects.Effect]:
+    def take(self, input: Input[steps.ControlStep], now: Seconds) -> list[steps.Effect]:
         """Take a step."""
         self._now = now
         match step := input.message:
@@ -162,20 +162,20 @@ class ControlIntake:
             case steps.FaultsPlayed():
                 self._faults_played(step)
             case steps.BodyComplained(fault=fault):
-                self._do(effects.Alert(fault))
+                self._do(steps.Alert(fault))
         return self._take()
 
     def _show(self, world: World | None) -> None:
         """Let the body see the world, in which people are found by any of their ids."""
         if world is not None:
             self.world = self._names.by_any_id(world)
-            self._do(effects.ShowWorld(self.world))
+            self._do(steps.ShowWorld(self.world))
 
-    def _take(self) -> list[effects.Effect]:
+    def _take(self) -> list[steps.Effect]:
         outputs, self._outputs = self._outputs, []
         return outputs
 
-    def _do(self, *outputs: effects.Effect) -> None:
+    def _do(self, *outputs: steps.Effect) -> None:
         self._outputs += outputs
 
     def _stamp(self, at: Seconds | None = None) -> Stamp:
@@ -208,7 +208,7 @@ class ControlIntake:
             case GoHome(id=id, parts=parts):
                 self._homeward[id] = request
                 self._reply(Accepted(id=id))
-                self._do(effects.TakeHome(id, parts, id))
+                self._do(steps.TakeHome(id, parts, id))
             case Cancel() if live is not None and handed.is_orphaned:
                 self._lapse(live, request)
             case Cancel() if live is not None:
@@ -216,7 +216,7 @@ class ControlIntake:
                 self._revoke(live)
             case Cancel(id=id) if id in self._homeward and not handed.is_orphaned:
                 del self._homeward[id]
-                self._do(effects.StopHome(id))
+                self._do(steps.StopHome(id))
                 self._refuse(id, request.fault(id).following("given up on the way home", id))
 
     def _begin(self, request: PerformBehavior, asked: str) -> None:
@@ -231,7 +231,7 @@ class ControlIntake:
             self._refuse(name, Fault(reason=str(error), where=request.behavior.id, service="control"))
             return
         self._live[name] = live
-        self._do(effects.BeginBehavior(request, live.voiced))
+        self._do(steps.BeginBehavior(request, live.voiced))
         self._hold_or_go_on(live)
 
     def _extend(self, live: LiveBehavior, request: PerformBehavior) -> None:
@@ -243,7 +243,7 @@ class ControlIntake:
         except ValueError as error:
             fault = Fault(reason=str(error), where=live.request.behavior.id, service="control")
             self._publish(keys.fault("control"), fault)
-        self._do(effects.GiveAuthority(request.id, live.authority.through, request.pace))
+        self._do(steps.GiveAuthority(request.id, live.authority.through, request.pace))
         live.is_held = request.held
         self._hold_or_go_on(live)
 
@@ -268,7 +268,7 @@ class ControlIntake:
         others = (each for each in self._live.values() if each.request.requester == cancel.requester)
         if all(each.authority.revoked for each in others):
             why = cancel.fault("")
-            self._do(effects.Alert(replace(why, reason=f"{why.reason}; the body goes home", service="control")))
+            self._do(steps.Alert(replace(why, reason=f"{why.reason}; the body goes home", service="control")))
             self._take_home(f"after {cancel.requester}")
 
     # -- authority ----------------------------------------------------------------------------------------------
@@ -280,7 +280,7 @@ class ControlIntake:
                 live.authority.hold()
             else:
                 live.authority.go_on()
-            self._do(effects.HoldBehavior(live.request.id, is_held))
+            self._do(steps.HoldBehavior(live.request.id, is_held))
 
     def _hold_unheard(self, hold: HoldRequest) -> None:
         """Hold a behavior that nobody renews, or let it go on."""
@@ -301,7 +301,7 @@ class ControlIntake:
 
     def _revoke(self, live: LiveBehavior, how: AbortMode = "relax") -> None:
         if live.authority.revoked is None:
-            self._do(effects.RevokeAuthority(live.request.id, how))
+            self._do(steps.RevokeAuthority(live.request.id, how))
             self._note_revoked(live, how)
 
     def _note_revoked(self, live: LiveBehavior, how: Revocation) -> None:
@@ -364,7 +364,7 @@ class ControlIntake:
         """Leave a driver that has told what cannot be. Its stream is closed, which takes it a moment."""
         live.is_broken = True
         live.fault = self._broken(live, what)
-        self._do(effects.LeaveStream(live.request.id))
+        self._do(steps.LeaveStream(live.request.id))
         if live.overdue is None:
             live.overdue = self._now + REVOKED_WITHIN
 
@@ -373,7 +373,7 @@ class ControlIntake:
         live.is_broken_off = True
         live.fault = live.fault or self._broken(live, f"goes on {REVOKED_WITHIN:.0f} s after it was told to end it")
         live.overdue = self._now + BROKEN_OFF_WITHIN
-        self._do(effects.LeaveStream(live.request.id, is_cut_off=True))
+        self._do(steps.LeaveStream(live.request.id, is_cut_off=True))
 
     def _give_up(self, live: LiveBehavior) -> None:
         """End a behavior without its driver, which goes on with it whatever is done."""
@@ -430,20 +430,20 @@ class ControlIntake:
 
     def _take_home(self, why: str) -> None:
         """Move the whole body home without a request."""
-        self._do(effects.TakeHome("", (), why))
+        self._do(steps.TakeHome("", (), why))
 
     def _home_ended(self, ended: steps.HomeEnded) -> None:
         request, fault = self._homeward.pop(ended.request, None), ended.fault
         if fault is not None:
             if fault.cause != "replaced" and not ended.is_told:
-                self._do(effects.Alert(fault))
+                self._do(steps.Alert(fault))
                 self._has_not_come_home = True
             if request is not None:
                 self._refuse(request.id, replace(fault, whose=request.requester) if fault.cause else fault)
             return
         if self._has_not_come_home and not ended.parts:
             self._has_not_come_home = False
-            self._do(effects.Reassure("the body is at home"))
+            self._do(steps.Reassure("the body is at home"))
         if request is not None:
             self._reply(HomeReached(id=request.id, at=self._stamp()))
 
@@ -467,7 +467,7 @@ class ControlIntake:
         except InputRefused as error:
             self._refuse(request.id, error.fault)
         else:
-            self._do(effects.PlayFaults(request, faults))
+            self._do(steps.PlayFaults(request, faults))
 
     def _faults_played(self, played: steps.FaultsPlayed) -> None:
         self._faults = played.faults

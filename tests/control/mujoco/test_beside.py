@@ -16,8 +16,7 @@ from engage_hri.schemas.body import RobotSeen, RobotState
 from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.faults import InputRefused
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.control.calibrating.fitting import Fit, fit
-from engage_hri.services.control.calibrating.measuring import SimulatedEyes, marks, measured
+from engage_hri.services.control.calibrating import Fit, SimulatedEyes, fit, marks, measured
 from engage_hri.services.control.contract.body import Body
 from engage_hri.services.control.mujoco.body import MujocoBody
 from engage_hri.services.control.testing import WORLD, Stage

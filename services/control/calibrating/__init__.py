@@ -1,1 +1,0 @@
-"""Calibration from measurements: what is measured, and what fits it."""
