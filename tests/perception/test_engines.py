@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from engage_hri.services.perception.hearing import microphone
-from engage_hri.services.perception.hearing.listening import found
+from engage_hri.services.perception.hearing.listening import Order
 from engage_hri.services.perception.hearing.recognizing import RecognizerSettings, SpeechRecognizer, SpeechWords
 from engage_hri.services.perception.hearing.voice import RATE
 
@@ -23,7 +23,7 @@ SECOND = np.full(RATE, 16384, np.int16)
 
 def made(name: str, module: str, monkeypatch: pytest.MonkeyPatch, engine: Any, **settings: Any) -> SpeechRecognizer:
     monkeypatch.setitem(sys.modules, module, engine)
-    return found(name, RecognizerSettings(**settings))
+    return Order(name, RecognizerSettings(**settings)).made()
 
 
 def test_vosk_tells_words_as_they_come_and_leaves_out_what_it_does_not_know(
