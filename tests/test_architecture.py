@@ -73,7 +73,8 @@ LAYERS = {
     "services/perception/pieces": "service > watching > keeping sources > finding > hands > spotting"
     " > colors > config",
     "services/perception/hearing": "service > device pages > intake > speeches"
-    " > company listening microphone own_voice recognizers > lips recognizing sound > voice > config",
+    " > company listening microphone own_voice recognizers smart_turn > lips turn_detectors > recognizing sound"
+    " > voice > config",
     "services/commandline": "look robot study talk > app bodies embedding > shell",
     "services/client": "conversation > language_models > robot > heard turn > known_objects outcomes > performing"
     " > orders > feeds people > chunking event_stream inputs turn_ends",

@@ -12,7 +12,7 @@ from engage_hri.services.commandline.shell.settings import RobotConfig
 from engage_hri.services.perception.hearing.microphone import RECORDERS
 from engage_hri.services.perception.hearing.recognizing import RecognizerSettings, SpeechWords, settings_of
 from engage_hri.services.runtime.configuration import read
-from engage_hri.services.runtime.installation import RECOGNIZERS, offers
+from engage_hri.services.runtime.installation import RECOGNIZERS, TURN_DETECTORS, offers
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "hearing.md").read_text(encoding="utf-8")
 
@@ -21,15 +21,16 @@ def shown(language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
 
 
-def test_its_command_has_settings_that_there_are():
-    [(_, command)] = [block.strip().splitlines() for block in shown("sh")]
-    words = shlex.split(command)
-    assert words[:2] == [".venv/bin/engage", "run"]
-    assert group(words[2]) == ("hearing",)
-
-    settings = [value for option, value in pairwise(words) if option == "--set"]
-    config = read(RobotConfig, settings=settings).hearing
-    assert settings_of(config).phrases == ("yes", "no", "the blue one")
+def test_its_commands_have_settings_that_there_are():
+    commands = [block.strip().splitlines()[-1] for block in shown("sh")]
+    configs = []
+    for words in map(shlex.split, commands):
+        assert words[:2] == [".venv/bin/engage", "run"]
+        assert group(words[2]) == ("hearing",)
+        settings = [value for option, value in pairwise(words) if option == "--set"]
+        configs.append(read(RobotConfig, settings=settings).hearing)
+    assert settings_of(configs[0]).phrases == ("yes", "no", "the blue one")
+    assert configs[1].turn_detector in {each.name for each in offers(TURN_DETECTORS)}
     for setting in re.findall(r"`hearing\.(\w+)", PAGE):
         assert setting in config.__struct_fields__
 

@@ -420,6 +420,7 @@ class AdjacencyPair(Machine):
             return
         if self._unanswered is None and other._unanswered is not None:
             self._unanswered, self._turn_end = other._unanswered, other._turn_end
+            self._forgotten_at = other._forgotten_at
             self._unanswered.responder = person
         if other._third_turn_until > self._third_turn_until:
             self._third_turn_until = other._third_turn_until
