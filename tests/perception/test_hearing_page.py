@@ -32,7 +32,7 @@ def test_its_commands_have_settings_that_there_are():
     assert settings_of(configs[0]).phrases == ("yes", "no", "the blue one")
     assert configs[1].turn_detector in {each.name for each in offers(TURN_DETECTORS)}
     for setting in re.findall(r"`hearing\.(\w+)", PAGE):
-        assert setting in config.__struct_fields__
+        assert setting in configs[0].__struct_fields__
 
 
 def test_its_recognizer_is_one():
