@@ -1,5 +1,5 @@
 // The page's state: sections as they come with frames, and a clock that runs between frames.
-import { follow } from "./link.js";
+import { ENDED, follow } from "./link.js";
 import { map } from "./map.js";
 import { space } from "./space.js";
 import { behaviorLanes, eventLanes, floorLanes } from "./lanes.js";
@@ -94,7 +94,8 @@ export function begin(root, robot) {
   const waits = root.querySelector(".waits");
   const link = follow({
     take,
-    tell(there, reason = "") {
+    tell(there, told = "") {
+      const reason = told === ENDED ? "" : told; // there may be a window again: it is called, as one that is lost
       warning.link(there, reason);
       const away = there ? "" : reason || "the window does not answer";
       if (away === state.away) return;
