@@ -385,7 +385,7 @@ class GenerationIntake:
             since = Stamp(self._clock.name, ruling.since)
             self._publish(keys.HEAD_OWNER, HeadOwner(owner=ruling.owner, since=since, waiting=ruling.waiting))
         if ruling.shift is not None:
-            why = Fault(reason="the head is to go elsewhere", cause="cancelled", whose=NAME)
+            why = Fault(reason="the head is to go elsewhere", cause="cancelled", whose=NAME, service=NAME)
             # A shift waits for the one before it: the eyes would come to where they are not to be, and leave at once.
             self._outputs += [CancelRequest(id, why) for id in self._shifts]
             self._shifts[self._send(ruling.shift)] = ruling.shift.id
