@@ -286,7 +286,8 @@ class Asking:
         asked.cancel = self._cancellation(asked, why)
         if asked.sent_at is None:
             fault = asked.cancel.fault(id).following("cancelled before it was sent", id)
-            self._step(asked, AskingEvent.REFUSED, now, Refused(id=id, fault=fault))
+            told = Refused(id=id, fault=replace(fault, service=why.service))  # nobody else has heard of it
+            self._step(asked, AskingEvent.REFUSED, now, told)
         else:
             self._step(asked, AskingEvent.CANCELLED, now)
 

@@ -162,17 +162,19 @@ class Listener:
             is_speech = part.action == "speak"
             if not self._is_echo(part) if is_speech else self._exchange.pair.may_be_answered_with(part.action):
                 is_gesture_of_answer = reading == "answer" and not is_speech
-                if sign is not None and is_gesture_of_answer and self._awaits_words_before(sign, part):
+                if sign is not None and is_gesture_of_answer and self._awaits_words_before(sign, part, at):
                     sign.outlasting = part
                 else:
                     self._takes_floor(part, at, reading)
                 return
 
-    def _awaits_words_before(self, sign: ListenerSign, part: SignPart) -> bool:
-        """True if words may come of a speech of the sign that began before a part of it."""
-        if not self._scene.is_worded or sign.is_wordless:
+    def _awaits_words_before(self, sign: ListenerSign, part: SignPart, at: Seconds) -> bool:
+        """True if words may come of the last speech of the sign, and it began before a part of it."""
+        if not self._scene.is_worded or sign.is_wordless or not sign.speeches:
             return False
-        return any(each.since < part.since and not self._asks_for_nothing(each) for each in sign.speeches)
+        speech = sign.speeches[-1]
+        may_come = at < speech.since + WORDS_WAIT and not self._asks_for_nothing(speech)
+        return may_come and speech.since < part.since
 
     def understand(self, speech: SignPart, at: Seconds, *, in_turn: bool, is_last: bool) -> None:
         """Judge a speech by its words.

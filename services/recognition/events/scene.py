@@ -278,7 +278,7 @@ class SessionScene:
         """True if neither the person nor the robot has begun to say something to the other since, until then."""
         said = [
             each for each in self.spoken
-            if since < each.since < until and not (each.is_noise or each.may_be_noise)
+            if since < each.since <= until and not (each.is_noise or each.may_be_noise)
         ]  # fmt: skip
         robot = self.robot
         return not any(
