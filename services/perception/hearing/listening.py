@@ -11,6 +11,7 @@ import sys
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
+from typing import Any, ClassVar
 
 import msgspec
 
@@ -45,42 +46,48 @@ MOST_UNREAD = 4 * 2**20
 OnAnswer = Callable[[Answer], None]
 
 
-class Order(msgspec.Struct, frozen=True, tag=True):
-    """The first order: the recognizer to make. name: that of its offer."""
+class HelperOrder(msgspec.Struct, frozen=True):
+    """The first order: what to make. name: that of its offer. settings: what it is made of.
 
+    GROUP: entry points among which it is. KIND: what it is, in words. WHERE: the setting that names it.
+    """
+
+    GROUP: ClassVar[str]
+    KIND: ClassVar[str]
+    WHERE: ClassVar[str]
     name: str
-    settings: RecognizerSettings
+    settings: Any
 
     @property
     def what(self) -> str:
-        return f"the recognizer {self.name}"
-
-    @property
-    def where(self) -> str:
-        return "hearing.recognizer"
+        return f"the {self.KIND} {self.name}"
 
     def made(self) -> SpeechRecognizer:
         """Find it, import it and make it. Raises InputRefused."""
-        made: SpeechRecognizer = make_offered(RECOGNIZERS, "recognizer", self.name, self.settings, self.where)
+        made: SpeechRecognizer = make_offered(self.GROUP, self.KIND, self.name, self.settings, self.WHERE)
         return made
 
+    def desk(self) -> Desk:
+        """Make it, and give it a desk. Raises InputRefused."""
+        return Desk(self.made(), f"the {self.KIND}")
 
-class DetectorOrder(msgspec.Struct, frozen=True, tag=True):
-    """The same of a detector of turns."""
 
-    name: str
+class Order(HelperOrder, frozen=True, tag=True):
+    """Order of a recognizer."""
+
+    GROUP, KIND, WHERE = RECOGNIZERS, "recognizer", "hearing.recognizer"
+    settings: RecognizerSettings
+
+
+class DetectorOrder(HelperOrder, frozen=True, tag=True):
+    """Order of a detector of turns."""
+
+    GROUP, KIND, WHERE = TURN_DETECTORS, "turn detector", "hearing.turn_detector"
     settings: TurnDetectorSettings
 
-    @property
-    def what(self) -> str:
-        return f"the turn detector {self.name}"
-
-    @property
-    def where(self) -> str:
-        return "hearing.turn_detector"
-
     def made(self) -> SpeechRecognizer:
-        return DetectorAtDesk(make_offered(TURN_DETECTORS, "turn detector", self.name, self.settings, self.where))
+        made: Any = HelperOrder.made(self)
+        return DetectorAtDesk(made)
 
 
 class Made(msgspec.Struct, frozen=True, tag=True):
@@ -113,7 +120,7 @@ class InThisProcess(Understanding):
         self._desk: Desk | None = None
 
     async def made(self) -> None:
-        self._desk = Desk(self._order.made())
+        self._desk = self._order.desk()
 
     def hear(self, speech: int, samples: bytes) -> None:
         assert self._desk is not None
@@ -145,7 +152,7 @@ class InItsOwn(Understanding):
             await asyncio.wait_for(asyncio.shield(self._made), MAKING)
         except TimeoutError:
             reason = f"{self._order.what} is not there after {MAKING:g} s"
-            raise InputRefused(Fault(reason=reason, where=self._order.where)) from None
+            raise InputRefused(Fault(reason=reason, where=self._order.WHERE)) from None
 
     def hear(self, speech: int, samples: bytes) -> None:
         if speech in self._failed:
@@ -197,7 +204,7 @@ class InItsOwn(Understanding):
         self._on_answer(answer)
 
     def _lose(self, how: str, fault: Fault | None = None) -> None:
-        fault = fault or Fault(reason=f"{self._order.what} {how}", where=self._order.where)
+        fault = fault or Fault(reason=f"{self._order.what} {how}", where=self._order.WHERE)
         lost = tuple(self._open)
         self.close()
         if not self._made.done():
@@ -215,7 +222,7 @@ def main() -> None:
     answer = answering()
     order = next_message(sys.stdin.buffer, Order | DetectorOrder)
     try:
-        desk = Desk(order.made())
+        desk = order.desk()
     except Exception as error:
         reason = f"{order.what} cannot be made: {type(error).__name__}: {error}"
         answer(Made(error.fault if isinstance(error, EngageError) else Fault(reason=reason)))

@@ -132,10 +132,11 @@ Answer = KnownWords | NotUnderstood
 
 
 class Desk:
-    """The desk of a recognizer. A speech that fails is given up; the next one begins anew."""
+    """The desk of a recognizer. A speech that fails is given up; the next one begins anew. what: it is, in words."""
 
-    def __init__(self, recognizer: SpeechRecognizer) -> None:
+    def __init__(self, recognizer: SpeechRecognizer, what: str = "the recognizer") -> None:
         self._recognizer = recognizer
+        self._what = what
         self._speeches: dict[int, tuple[Listening | None, str]] = {}
         """By number: who hears it, None if it was given up, and the words that were told."""
 
@@ -157,7 +158,7 @@ class Desk:
                 yield KnownWords(order.speech, SpeechWords(_plain(words.text), confidence), final=True)
         except Exception as error:  # whatever an engine raises: it ends this speech, and no other
             self._speeches[order.speech] = None, ""
-            reason = f"the recognizer fails: {type(error).__name__}: {error}"
+            reason = f"{self._what} fails: {type(error).__name__}: {error}"
             yield NotUnderstood(order.speech, error.fault if isinstance(error, EngageError) else Fault(reason=reason))
         if not order.samples:
             del self._speeches[order.speech]

@@ -218,7 +218,8 @@ class Speeches:
                 case VoiceSound(samples=samples) if channel.speech is not None:
                     if self.recognizer is not None:
                         self.recognizer.hear(channel.speech.number, _bytes(samples))
-                    channel.turn.hear(samples)
+                    if self.detector is not None:
+                        channel.turn.hear(samples)
                 case VoiceEnded(at=at, why=why) if (speech := channel.speech) is not None:
                     channel.speech = None
                     self._ended(speech, at)
