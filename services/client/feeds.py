@@ -183,6 +183,33 @@ class LevelFeed(DerivedFeed[Statistics]):
         return ()
 
 
+class StatisticsFeed(DerivedFeed[Statistics]):
+    """Statistics of one person, by whatever id somebody knows them. Only the newest are kept."""
+
+    def __init__(self, bus: Bus, actor: str) -> None:
+        super().__init__(bus, (keys.ANY_STATISTICS, keys.SAME_PEOPLE), Keep.LATEST)
+        self._actor = actor
+        self._names = PeopleNames()
+        self._last: dict[str, Statistics] = {}
+        """The newest of each person: the word that two ids are one may come after them."""
+
+    @property
+    def _due(self) -> None:
+        return None
+
+    def _taken(self, received: Received) -> Iterable[Statistics]:
+        message, name = received.message, self._names.name(self._actor)
+        if isinstance(message, Statistics):
+            self._last[message.actor] = message
+            return (message,) if message.actor == name else ()
+        self._names.take(message)
+        now = self._names.name(self._actor)
+        return (self._last[now],) if now != name and now in self._last else ()
+
+    def _passed(self) -> Iterable[Statistics]:
+        return ()
+
+
 SAME_PATIENCE: Seconds = 0.2
 """Time for which the first world waits for the news who is one person: recognition may not be there. Ours."""
 

@@ -27,7 +27,16 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.config import Mode
 from engage_hri.services.bus.interface import Hub, Keep
 from engage_hri.services.client.event_stream import EventStream
-from engage_hri.services.client.feeds import ActionFeed, EventFeed, Feed, LevelFeed, NewFeed, WorldFeed, first_of
+from engage_hri.services.client.feeds import (
+    ActionFeed,
+    EventFeed,
+    Feed,
+    LevelFeed,
+    NewFeed,
+    StatisticsFeed,
+    WorldFeed,
+    first_of,
+)
 from engage_hri.services.client.heard import HeardFeed
 from engage_hri.services.client.inputs import listed, shown, taken
 from engage_hri.services.client.performing import PerformingRobot
@@ -172,13 +181,17 @@ class Robot(PerformingRobot):
     def statistics_updates(self, actor: str = "") -> Feed[Statistics]:
         """Follow the statistics of a person, or of each and `all`: now, and at each change. Only the newest are kept.
 
-        actor: id of the person, or `all` for all together; empty: each of these.
+        actor: id of the person, any that they have, or `all` for all together; empty: each of these.
 
         Raises:
             InputRefused: `actor` is no text.
             ValueError: a name that can be no person.
         """
-        return self._feed((Statistics,), keys.statistics(keys.chunk(taken(actor, str, "actor"))), keep=Keep.LATEST)
+        key = keys.statistics(keys.chunk(taken(actor, str, "actor")))
+        if actor in ("", "all"):
+            return self._feed((Statistics,), key, keep=Keep.LATEST)
+        self._requests.check()
+        return StatisticsFeed(self._bus, actor)
 
     async def statistics(self, actor: str = "all", timeout: Seconds | None = None) -> Statistics:
         """Return the statistics of a person, or of `all`, as they are now; waits for recognition.

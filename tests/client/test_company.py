@@ -99,3 +99,30 @@ async def test_an_id_that_turns_out_to_be_somebody_elses_has_no_level_any_more()
     assert told["ann"] == ["engaging", "engaged"]
     assert told["face_3"][:3] == ["engaging", "engaged", "unknown"]
     assert "engaging" in told["face_3"][3:]
+
+
+async def test_the_statistics_of_a_person_come_under_each_id_that_they_have() -> None:
+    async with (
+        embedded(human="none") as robot,
+        perceive("ann", hub=robot.hub) as ann,
+        perceive("face_3", hub=robot.hub) as face,
+    ):
+        with robot.statistics_updates("face_3") as followed:
+            await ann.look_at(ann.robot)
+            await face.look_at(face.robot)
+            await asyncio.sleep(4.0)
+            face.same_as("ann")
+            await asyncio.sleep(2.0)
+            late, own = await robot.statistics("face_3", timeout=1.0), await robot.statistics("ann", timeout=1.0)
+            told = []
+            while (each := await followed.next(0.0)) is not None:
+                told.append(each)
+            face.same_as("face_3")
+            await face.look_at(face.robot)
+            await asyncio.sleep(2.0)
+            apart = await robot.statistics("face_3", timeout=1.0)
+
+    assert late == own
+    assert late.actor == "ann"
+    assert told[-1] == own, "who follows the other id goes on with the person"
+    assert apart.actor == "face_3"
