@@ -1,6 +1,7 @@
 """Faults (reason, place, advice) as a message, and the small hierarchy of exceptions that carry them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Literal
 
 from msgspec import Struct
@@ -136,6 +137,26 @@ class ServerRestarted(OutcomeUnknown):
 
 class NeverEnded(OutcomeUnknown):
     """The server was asked to end the request, and has not."""
+
+
+@contextmanager
+def raised_as(
+    kind: type[EngageError],
+    errors: type[Exception] | tuple[type[Exception], ...],
+    where: object = "",
+    problem: str = "",
+    advice: str = "",
+) -> Iterator[None]:
+    """Raise errors of the system or of a library, in the body of `with`, as one of ours.
+
+    errors: their classes. problem: words before those of the error, as in `cannot write: No space left on device`.
+    """
+    try:
+        yield
+    except errors as error:
+        said = getattr(error, "strerror", None) or str(error)
+        reason = f"{problem}: {said}" if problem else said
+        raise kind(Fault(reason=reason, where=str(where), advice=advice)) from error
 
 
 def bug(error: BaseException, where: str, service: str) -> Fault:

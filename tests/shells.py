@@ -25,7 +25,6 @@ SHELLS = {
     "services/control/voice/sounding.py",  # a body that speaks on the loop's clock
     "services/console/web/sessions.py",  # ends sessions whose page does not come back
     "services/perception/child.py",  # a process with pipes
-    "services/runtime/packages.py",  # runs pip and npm
     "services/perception/eyes/pages.py",  # takes what cameras of pages see
     "services/perception/eyes/people.py",  # publishes people and heads
     "services/perception/eyes/watching.py",  # runs the process of a source

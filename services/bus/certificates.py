@@ -15,7 +15,7 @@ from cryptography.hazmat.primitives.asymmetric.ec import SECP256R1, EllipticCurv
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from engage_hri.schemas.access import PARTICIPANTS, ROLES, ROUTER, Holder
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, raised_as
 from engage_hri.schemas.keys import CHUNK, is_chunk
 from engage_hri.services.bus.keyring import AUTHORITY, CERTIFICATE, HOLDERS, PRIVATE, WHO, Who
 
@@ -288,10 +288,8 @@ def _read_holder(place: Path) -> Holder:
 
 
 def _decoded(path: Path, kind: object) -> Any:
-    try:
+    with raised_as(InputRefused, (msgspec.DecodeError, UnicodeDecodeError), path, "damaged"):
         return msgspec.json.decode(_read(path), type=kind)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise InputRefused(Fault(reason=f"damaged: {error}", where=str(path))) from error
 
 
 def _load(path: Path) -> x509.Certificate:
@@ -312,8 +310,6 @@ def _load_key(path: Path) -> EllipticCurvePrivateKey:
 
 
 def _read(path: Path) -> bytes:
-    try:
+    advice = "it is where `engage keys init` was called" if path.name == SECRET else "`engage keys init` makes it"
+    with raised_as(InputRefused, OSError, path, advice=advice):
         return path.read_bytes()
-    except OSError as error:
-        advice = "it is where `engage keys init` was called" if path.name == SECRET else "`engage keys init` makes it"
-        raise InputRefused(Fault(reason=error.strerror or str(error), where=str(path), advice=advice)) from error

@@ -19,7 +19,7 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas.access import Holder
-from engage_hri.schemas.faults import Fault, InputRefused, NotReady
+from engage_hri.schemas.faults import Fault, InputRefused, NotReady, raised_as
 from engage_hri.schemas.units import A_DAY, Seconds, span
 
 AUTHORITY, CERTIFICATE, PRIVATE, WHO, HOLDERS = (
@@ -73,10 +73,8 @@ def read_keys(folder: str | Path, name: str) -> Keys:
             raise NotReady(Fault(reason=f"no keys of {name!r}", where=str(folder), advice=known))
     holder = _read(place / WHO, Who)
     for file in (AUTHORITY, CERTIFICATE, PRIVATE):
-        try:
+        with raised_as(NotReady, OSError, place / file):
             (place / file).read_bytes()
-        except OSError as error:
-            raise NotReady(Fault(reason=error.strerror or str(error), where=str(place / file))) from error
     if mode := (place / PRIVATE).stat().st_mode & 0o077:
         reason = f"others may read this private key (mode {mode:03o} for group and others)"
         raise InputRefused(Fault(reason=reason, where=str(place / PRIVATE), advice="chmod 600"))
@@ -123,12 +121,10 @@ def _shake_hands(server: ssl.SSLContext, client: ssl.SSLContext) -> None:
 
 
 def _read(path: Path, kind: type) -> Any:
-    try:
-        return msgspec.json.decode(path.read_bytes(), type=kind)
-    except OSError as error:
-        raise NotReady(Fault(reason=error.strerror or str(error), where=str(path), advice=_ADVICE)) from error
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise InputRefused(Fault(reason=f"damaged: {error}", where=str(path), advice=_ADVICE)) from error
+    with raised_as(NotReady, OSError, path, advice=_ADVICE):
+        text = path.read_bytes()
+    with raised_as(InputRefused, (msgspec.DecodeError, UnicodeDecodeError), path, "damaged", _ADVICE):
+        return msgspec.json.decode(text, type=kind)
 
 
 AHEAD: tuple[Seconds, ...] = (30 * A_DAY, 7 * A_DAY, A_DAY, 0.0)

@@ -8,7 +8,7 @@ import msgspec
 
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.json_codec import read, read_call
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, raised_as
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.messages import decode, published
 from engage_hri.schemas.requests import Request
@@ -87,10 +87,9 @@ def checked(key: str, request: R) -> R:
 
     key: where it is sent.
     """
-    try:
+    unsendable = (UnicodeEncodeError, OverflowError, TypeError, ValueError, RecursionError, msgspec.MsgspecError)
+    with raised_as(InputRefused, unsendable, request.id):
         decode(*published(key, request))  # type: ignore[arg-type]
-    except (UnicodeEncodeError, OverflowError, TypeError, ValueError, RecursionError, msgspec.MsgspecError) as error:
-        raise InputRefused(Fault(reason=str(error), where=str(request.id))) from error
     return request
 
 

@@ -16,7 +16,7 @@ from engage_hri.schemas.access import OWN, Does
 from engage_hri.schemas.blocks import BehaviorInterrupted, Block, BlockOutcome
 from engage_hri.schemas.body import Capabilities
 from engage_hri.schemas.body_faults import BodyFault, BodyFaults
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, raised_as
 from engage_hri.schemas.fragments import FragmentOutcome, HeadOwner, StudyCondition, TurnFragment
 from engage_hri.schemas.recognition import Floor, Statistics
 from engage_hri.schemas.summary import Summary, summary
@@ -131,21 +131,21 @@ class Operation(NamedTuple):
 
 def decoded(kind: type[Struct], body: bytes) -> Any:
     """Read the body of a request. Raises InputRefused with the JSON path."""
-    try:
+    with raised_as(
+        InputRefused,
+        (msgspec.DecodeError, UnicodeDecodeError, RecursionError),
+        "body",
+        advice="the form is in /v1/openapi.json",
+    ):
         return msgspec.json.decode(body, type=kind)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        advice = "the form is in /v1/openapi.json"
-        raise InputRefused(Fault(reason=str(error), where="body", advice=advice)) from error
 
 
 def queried(kind: type[Struct], given: dict[str, str]) -> Any:
     """Read the parameters of an address. Raises InputRefused."""
-    try:
+    takes = ", ".join(each.name for each in structs.fields(kind))
+    advice = f"parameters: {takes}" if takes else "it has no parameters"
+    with raised_as(InputRefused, msgspec.ValidationError, "address", advice=advice):
         return msgspec.convert(given, kind, strict=False)
-    except msgspec.ValidationError as error:
-        takes = ", ".join(each.name for each in structs.fields(kind))
-        advice = f"parameters: {takes}" if takes else "it has no parameters"
-        raise InputRefused(Fault(reason=str(error), where="address", advice=advice)) from error
 
 
 async def _turn(robot: Robot, body: bytes, query: TurnQuery) -> Summary:

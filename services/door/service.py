@@ -5,7 +5,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.faults import Fault, InputRefused, RunFailed, raised_as
 from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.client.robot import Robot
@@ -38,10 +38,8 @@ async def open_door(bus: Bus, ready: Ready, config: DoorConfig) -> None:
 def _tokens(config: DoorConfig) -> Mapping[str, str]:
     """The token of each role. Raises InputRefused if the folder cannot be made."""
     folder = Path(config.folder)
-    try:
+    with raised_as(InputRefused, OSError, folder, "cannot be made"):
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputRefused(Fault(reason=f"cannot be made: {error.strerror}", where=str(folder))) from error
     return {role: kept_token(folder / role) for role in config.roles}
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 from msgspec import Raw, Struct
 
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import InputRefused, raised_as
 from engage_hri.schemas.summary import Summary
 from engage_hri.schemas.tool import PARTS, Part, ToolInput
 
@@ -29,10 +29,8 @@ class BeginTurn(WritingOrder, frozen=True, kw_only=True, tag="begin"):
 
     def options(self) -> ToolInput:
         """Read `turn`. Raises InputRefused."""
-        try:
+        with raised_as(InputRefused, msgspec.ValidationError, "turn"):
             return msgspec.convert({**self.turn, "turn_status": "full", "parts": ()}, ToolInput)
-        except msgspec.ValidationError as error:
-            raise InputRefused(Fault(reason=str(error), where="turn")) from error
 
 
 class WriteText(WritingOrder, frozen=True, kw_only=True, tag="text"):
@@ -48,13 +46,11 @@ class WritePart(WritingOrder, frozen=True, kw_only=True, tag="part"):
 
     def read(self) -> Part:
         """Read the part. Raises InputRefused."""
-        try:
+        advice = "one of say, refer, look, gesture"
+        with raised_as(InputRefused, (msgspec.DecodeError, RecursionError), "part", advice=advice):
             named = msgspec.json.decode(self.part, type=dict[str, Any])
             kind = next((each for each in PARTS if each.__struct_fields__[0] in named), PARTS[0])
             return msgspec.json.decode(self.part, type=kind)
-        except (msgspec.DecodeError, RecursionError) as error:
-            advice = "one of say, refer, look, gesture"
-            raise InputRefused(Fault(reason=str(error), where="part", advice=advice)) from error
 
 
 class EndTurn(WritingOrder, frozen=True, kw_only=True, tag="end"):
@@ -112,9 +108,6 @@ _orders: "msgspec.json.Decoder[AnyWritingOrder]" = msgspec.json.Decoder(AnyWriti
 
 def order(text: str) -> AnyWritingOrder:
     """Read what a program says. Raises InputRefused for what is no order."""
-    try:
+    unreadable = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+    with raised_as(InputRefused, unreadable, "order", advice="docs/other-languages.md has them"):
         return _orders.decode(text)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputRefused(
-            Fault(reason=str(error), where="order", advice="docs/other-languages.md has them")
-        ) from error

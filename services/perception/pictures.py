@@ -14,7 +14,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused, raised_as
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.runtime.installation import extra_command
 
@@ -153,11 +153,8 @@ class FilmPictures(Pictures):
 
 def opencv(sense: str) -> Any:
     """Import OpenCV for a sense. Raises InputRefused: it is not installed."""
-    try:
+    with raised_as(InputRefused, ImportError, f"{sense}.source", advice=extra_command("eyes")):
         import cv2
-    except ImportError as error:
-        fault = Fault(reason=str(error), where=f"{sense}.source", advice=extra_command("eyes"))
-        raise InputRefused(fault) from error
     return cv2
 
 

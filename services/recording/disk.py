@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, raised_as
 from engage_hri.services.recording.reading import REPAIRED, Recording
 from engage_hri.services.recording.writing import Sealed, Writer
 
@@ -166,12 +166,9 @@ class Aside:
 
 def read(path: Path) -> Recording:
     """Open a recording. Raises InputRefused: there is none."""
-    try:
-        with path.open("rb") as file:
-            size = os.fstat(file.fileno()).st_size
-            data = mmap.mmap(file.fileno(), size, access=mmap.ACCESS_READ) if size else b""
-    except OSError as error:
-        raise InputRefused(Fault(reason=f"cannot read: {error.strerror}", where=str(path))) from error
+    with raised_as(InputRefused, OSError, path, "cannot read"), path.open("rb") as file:
+        size = os.fstat(file.fileno()).st_size
+        data = mmap.mmap(file.fileno(), size, access=mmap.ACCESS_READ) if size else b""
     return Recording(data, str(path))  # type: ignore[arg-type]  # a map is read like bytes
 
 

@@ -10,7 +10,7 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas.advice import explained
-from engage_hri.schemas.faults import Fault, InputRefused, NotReady
+from engage_hri.schemas.faults import Fault, InputRefused, NotReady, raised_as
 from engage_hri.schemas.text import is_utf8, utf8
 from engage_hri.services.bus.config import BusConfig, environment
 
@@ -84,12 +84,11 @@ def _not_a_number(table: dict[str, Any], place: str = "") -> str:
 
 
 def _file(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(utf8(path.read_bytes(), str(path)))
-    except OSError as error:
-        raise NotReady(Fault(reason=error.strerror or str(error), where=str(path))) from error
-    except (ValueError, RecursionError) as error:  # a TOMLDecodeError is a ValueError, and so is a number too long
-        raise InputRefused(Fault(reason=f"not TOML: {error}", where=str(path), advice=_ADVICE)) from error
+    with raised_as(NotReady, OSError, path):
+        text = utf8(path.read_bytes(), str(path))
+    # A TOMLDecodeError is a ValueError, and so is a number too long.
+    with raised_as(InputRefused, (ValueError, RecursionError), path, "not TOML", _ADVICE):
+        return tomllib.loads(text)
 
 
 def _setting(text: str) -> dict[str, Any]:

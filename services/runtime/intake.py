@@ -19,7 +19,7 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import InputRefused, raised_as
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.participants import ReadClock, Step, Taken
 from engage_hri.schemas.units import Seconds, Stamp
@@ -193,12 +193,9 @@ class StepDifference(Struct, frozen=True):
 
 def content_of(step: Step, kind: Any) -> Any:
     """Read what a step took. kind: the type that it is of, a union. Raises InputRefused: it is of no such type."""
-    try:
+    where, problem = f"step at {step.now:.3f} s", "a ledger has what this Engage does not know"
+    with raised_as(InputRefused, msgspec.ValidationError, where, problem, "use the Engage that recorded it"):
         return msgspec.convert(step.content, kind)
-    except msgspec.ValidationError as error:
-        reason = f"a ledger has what this Engage does not know: {error}"
-        fault = Fault(reason=reason, where=f"step at {step.now:.3f} s", advice="use the Engage that recorded it")
-        raise InputRefused(fault) from error
 
 
 class Again:

@@ -1,6 +1,10 @@
-"""Files of others that senses need: in which package of which registry they lie, and how they are known. Pure."""
+"""Files of others that senses need: in which package of which registry they lie, how they are known, and where they
+are kept. `engage eyes install` fetches them (services/commandline/robot/eyes.py); a service only reads them.
+"""
 
-from pathlib import PurePosixPath
+import os
+import sys
+from pathlib import Path, PurePosixPath
 from typing import Literal, NamedTuple
 
 
@@ -81,3 +85,19 @@ TURN_MODEL = Parcel(
 )  # fmt: skip
 PARCELS = {"eyes": (FACE_MODELS, PAGE_RUNTIME), "hearing": (TURN_MODEL,)}
 """By the sense that needs them."""
+
+
+def data_folder(sense: str) -> Path:
+    """Folder of this user in which the models of a sense are kept.
+
+    It lies in `ENGAGE_DATA`, or where data of programs lies here.
+    """
+    if own := os.environ.get("ENGAGE_DATA", ""):
+        return Path(own) / sense
+    if sys.platform == "darwin":
+        data = Path.home() / "Library/Application Support"
+    elif sys.platform == "win32":
+        data = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData/Local"))
+    else:
+        data = Path(os.environ.get("XDG_DATA_HOME", "") or Path.home() / ".local/share")
+    return data / "engage" / sense

@@ -8,7 +8,7 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, raised_as
 from engage_hri.schemas.perception import ActorFound, Utterance
 from engage_hri.schemas.text import utf8
 from engage_hri.schemas.units import FARTHEST, Stamp
@@ -84,12 +84,10 @@ def table_world() -> World:
 
 def load_world(path: Path) -> World:
     """The world in a JSON file. Raises InputRefused with the file, the JSON path and the reason."""
-    try:
-        entities = msgspec.json.decode(utf8(path.read_bytes(), str(path)), type=_File).entities
-    except OSError as error:
-        raise InputRefused(Fault(reason=error.strerror or str(error), where=str(path))) from error
-    except (msgspec.DecodeError, RecursionError) as error:
-        raise InputRefused(Fault(reason=str(error), where=str(path), advice=ADVICE)) from error
+    with raised_as(InputRefused, OSError, path):
+        text = utf8(path.read_bytes(), str(path))
+    with raised_as(InputRefused, (msgspec.DecodeError, RecursionError), path, advice=ADVICE):
+        entities = msgspec.json.decode(text, type=_File).entities
     seen: dict[str, int] = {}
     for index, entity in enumerate(entities):
         where = f"{path}: $.entities[{index}].id"

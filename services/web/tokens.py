@@ -7,7 +7,7 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, raised_as
 
 TOKEN = 12
 """Bytes of chance in a token."""
@@ -28,13 +28,10 @@ def kept_token(path: Path) -> str:
 
     On the command line, every user of the machine could read it.
     """
-    try:
+    with raised_as(InputRefused, (OSError, UnicodeDecodeError), path, "cannot be read or made"):
         with suppress(FileExistsError), open(path, "x", opener=partial(os.open, mode=0o600)) as file:
             file.write(f"{new_token()}\n")
         token, mode = path.read_text(encoding="utf-8").strip(), path.stat().st_mode
-    except (OSError, UnicodeDecodeError) as error:
-        reason = f"cannot be read or made: {getattr(error, 'strerror', None) or error}"
-        raise InputRefused(Fault(reason=reason, where=str(path))) from error
     if os.name == "posix" and mode & 0o077:
         raise InputRefused(Fault(reason="others may read it", where=str(path), advice=f"chmod 600 {path}"))
     if not re.fullmatch(r"[\w-]{12,}", token, re.ASCII):

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import pytest
 
 from engage_hri.schemas.perception import ActorLost
+from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.world import Entity, World
 from tests.generation.head_stories import check
 from tests.generation.heads import AT, Stage, act, event, inhibition, on_the_face, statistics, world
@@ -262,6 +263,44 @@ def test_the_partner_is_left_when_lost_and_found_again() -> None:
     stage.feed(people(ann=1.0, bob=2.0))
 
     assert stage.owners == [(0.0, "face", "bob"), (3.0, "face", "ann"), (9.0, "face", "bob")]
+
+
+def test_of_several_who_were_asked_each_is_looked_at_in_turn_until_one_is_left() -> None:
+    def asked(who: str, state: str = "started") -> ConnectionEvent:
+        return event(who, state, kind="adjacency_pair", initiator="robot", responder=who, objects=())
+
+    stage = Stage()
+    stage.feed(people(ann=1.0, bob=1.1, cy=1.2))
+    stage.do(lambda arbiter: arbiter.speak_to("ann"))
+    stage.feed(asked("ann"), asked("bob"), asked("cy"))
+    stage.do(lambda arbiter: arbiter.wait_for_answers())
+    stage.until(4.0)
+    stage.feed(asked("bob", "failed"), asked("cy", "failed"))
+    stage.until(5.0)
+
+    assert stage.owners == [
+        (0.0, "face", "ann"), (0.8, "face", "bob"), (1.6, "face", "cy"),
+        (2.4, "face", "ann"), (3.6, "face", "bob"), (4.4, "face", "ann"),
+    ]  # fmt: skip
+
+
+def test_whose_other_id_becomes_known_is_looked_at_on() -> None:
+    """By the face, by a fragment, and by a look away to think: none of them aims at an id that is in no world."""
+    stage = Stage()
+    stage.do(lambda arbiter: arbiter.speak_to("bob2"))
+    stage.feed(people(bob2=1.0))
+    stage.do(lambda arbiter: arbiter.think("bob2"))
+    stage.do(lambda arbiter: arbiter.fragment_gazes("bob2"))
+    stage.do(lambda arbiter: arbiter.join("bob2", "bob"))
+    stage.feed(people(bob=1.0))
+    owners = [stage.owners[-1]]
+    stage.do(lambda arbiter: arbiter.fragment_lets_go())
+    owners.append(stage.owners[-1])
+    stage.do(lambda arbiter: arbiter.stop_thinking())
+    stage.until(1.0)
+    stage.do(lambda arbiter: arbiter.join("eve", "ann"))  # nobody's order holds the head
+
+    assert [target for _, _, target in (*owners, stage.owners[-1])] == ["bob"] * 3
 
 
 def test_the_robots_own_hand_and_face_are_not_followed() -> None:

@@ -78,6 +78,23 @@ def refused(text: str | bytes) -> Fault:
     return fault
 
 
+def test_a_document_is_written_for_people_to_read_it_and_white_space_of_speech_is_kept() -> None:
+    block = Block(id="b", behaviors=(Gaze(id="g", target="cup"), Speech(id="s", text="Well,  this")))
+
+    assert (
+        encode_xml(block).decode()
+        == """\
+<?xml version='1.0' encoding='utf-8'?>
+<bml xmlns="org.mindmakers.bml" id="b">
+  <gaze id="g" target="cup"/>
+  <speech id="s">
+    <text xml:space="preserve">Well,  this</text>
+  </speech>
+</bml>
+"""
+    )
+
+
 def test_a_turn_fragment_is_read_with_the_line_of_everything() -> None:
     assert decode_xml(FRAGMENT) == TurnFragment(
         id="place",
@@ -241,6 +258,13 @@ def test_a_reference_to_a_mark_that_looks_like_an_offset_is_made_explicit() -> N
     )
 
     assert decoded.behaviors[1].timing == (Timing("start", "s:m-2+0"), Timing("end", "g:stroke-2"))
+
+
+def test_a_mark_without_a_name_is_refused_with_its_line() -> None:
+    with pytest.raises(InputRefused, match="a mark without a name") as refused:
+        block('<speech id="s"><text>a\n<sync/> b</text></speech>')
+
+    assert refused.value.fault.line == 2
 
 
 def test_before_and_after_keep_their_sides() -> None:

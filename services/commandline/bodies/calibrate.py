@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import msgspec
 import typer
 
-from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.faults import Fault, InputRefused, RunFailed, raised_as
 from engage_hri.schemas.text import utf8
 from engage_hri.schemas.units import Vector
 from engage_hri.schemas.world import Entity
@@ -146,7 +146,7 @@ def _by_seat(config: RobotConfig, source: str, at: Vector) -> "tuple[PlacedCamer
     from engage_hri.services.perception.eyes.looking import settings_of, unpacked
     from engage_hri.services.perception.eyes.placing import placed_by_seat
     from engage_hri.services.perception.eyes.watching import FACES, SourceOrder, opened
-    from engage_hri.services.runtime.packages import data_folder
+    from engage_hri.services.runtime.parcels import data_folder
 
     eyes = msgspec.structs.replace(config.eyes, source=source)
     order = SourceOrder(source.partition(":")[0], settings_of(eyes, str(data_folder("eyes"))))
@@ -382,10 +382,8 @@ def said(fit: Fit) -> list[str]:
 
 def read_measurements(path: Path) -> list[Measurement]:
     """Read measurements, a JSON object in each line. Raises InputRefused with the line."""
-    try:
+    with raised_as(InputRefused, OSError, path):
         text = utf8(path.read_bytes(), str(path))
-    except OSError as error:
-        raise InputRefused(Fault(reason=error.strerror or str(error), where=str(path))) from error
     found = []
     for number, line in enumerate(text.splitlines(), 1):
         if line.strip():

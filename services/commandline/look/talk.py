@@ -19,7 +19,7 @@ import typer
 from msgspec import json
 from rich.console import Console
 
-from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.faults import Fault, InputRefused, RunFailed, raised_as
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Hub
 from engage_hri.services.bus.memory import MemoryHub
@@ -128,11 +128,9 @@ def read_manager(path: Path | None) -> ManagerFile:
     Raises InputRefused: it cannot be run, or has no `talk`. Raises RunFailed: it cannot be written.
     """
     if path is not None and not path.exists():
-        try:
+        with raised_as(RunFailed, OSError, path, "it cannot be written"):
             path.write_bytes(RULES.read_bytes())
             complain(f"{path} is written: change it, and start again")
-        except OSError as error:
-            raise RunFailed(Fault(reason=f"it cannot be written: {error.strerror}", where=str(path))) from error
     names = _run(path or RULES)
     if not inspect.iscoroutinefunction(names.get("talk")):
         advice = "`async def talk(robot)`: it gets a Robot, and talks until it is cancelled"
@@ -151,10 +149,8 @@ def led_by_model(options: Options) -> ManagerFile:
     assert options.model is not None
     model_of(options.model)
     tools = [tool for source in options.tools or () for tool in _tools(source)]
-    try:
+    with raised_as(InputRefused, (OSError, UnicodeDecodeError), options.prompt, "it cannot be read"):
         prompt = options.prompt.read_text(encoding="utf-8") if options.prompt else ""
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputRefused(Fault(reason=f"it cannot be read: {error}", where=str(options.prompt))) from error
     named = options.model
 
     async def talk(robot: Robot) -> None:

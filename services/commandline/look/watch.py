@@ -10,7 +10,7 @@ from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import EventKind
 from engage_hri.schemas.blocks import BlockProgress, BodyHeld, Held, SyncPointProgress, WarningFeedback
 from engage_hri.schemas.body_faults import BodyFaults
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, raised_as
 from engage_hri.schemas.fragments import HeadOwner, StudyCondition
 from engage_hri.schemas.messages import Message, line
 from engage_hri.schemas.perception import Utterance
@@ -85,10 +85,8 @@ class Wanted(NamedTuple):
             for name in set(given) - set(good):
                 advice = f"known: {', '.join(good)}"
                 raise InputRefused(Fault(reason=f"unknown {name!r}", where=option, advice=advice))
-        try:
+        with raised_as(InputRefused, ValueError, "--actor"):
             keys.chunk(self.actor)
-        except ValueError as error:
-            raise InputRefused(Fault(reason=str(error), where="--actor")) from error
 
     @property
     def is_everything(self) -> bool:

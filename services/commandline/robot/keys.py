@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, raised_as
 from engage_hri.services.bus.config import BusConfig
 from engage_hri.services.commandline.shell.outputs import print_format
 from engage_hri.services.commandline.shell.process import DONE, FAILED
@@ -109,10 +109,8 @@ def _some(given: list[str]) -> list[str]:
 
 
 def _check_robot(robot: str) -> None:
-    try:
+    with raised_as(InputRefused, ValueError, "--robot"):
         BusConfig(robot=robot)
-    except ValueError as error:
-        raise InputRefused(Fault(reason=str(error), where="--robot")) from error
 
 
 def _tell(text: str) -> None:

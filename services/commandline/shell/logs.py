@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, raised_as
 from engage_hri.schemas.text import printable
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus import journal
@@ -125,12 +125,10 @@ def configure(path: Path | None = None, levels: Sequence[str] = (), *, alerts: b
     errors.setFormatter(Escaped())
     handlers: list[logging.Handler] = [errors]
     if path is not None:
-        try:
+        with raised_as(InputRefused, OSError, f"--log {path}", "cannot be written"):
             if path.is_fifo() or str(path) == "-":
                 raise OSError(0, "it is no file")
             handlers.append(LogFile(path, errors.tell))
-        except OSError as error:
-            raise InputRefused(Fault(reason=f"cannot be written: {error.strerror}", where=f"--log {path}")) from error
         handlers[-1].setFormatter(LogLine())
     root = logging.getLogger()
     for handler in [handler for handler in root.handlers if handler.name == HANDLER]:

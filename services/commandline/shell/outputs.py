@@ -17,7 +17,7 @@ import msgspec
 from rich.console import Console
 
 from engage_hri.schemas.blocks import BlockProgress, SyncPointProgress, WarningFeedback
-from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.faults import Fault, InputRefused, RunFailed, raised_as
 from engage_hri.schemas.messages import Message, line
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.summary import Summary
@@ -233,11 +233,9 @@ class Outputs:
             return None
         if path == STDOUT:
             return standard_output(FORMAT)
-        try:
+        with raised_as(InputRefused, OSError, path, "cannot write"):
             # Unbuffered, so that a reader that follows the file sees each line at once.
             file = self._files.enter_context(FileIO(path, "w"))
-        except OSError as error:
-            raise InputRefused(Fault(reason=f"cannot write: {error.strerror}", where=str(path))) from error
         return Patient(str(path), file.write, LOG.warning)
 
     def __call__(self, message: Message, at: Seconds) -> None:
@@ -274,7 +272,5 @@ class ResultFile:
 
     def write(self, content: bytes) -> None:
         """Write the whole. Raises RunFailed."""
-        try:
+        with raised_as(RunFailed, OSError, self.path, "cannot write"):
             self.path.write_bytes(content)
-        except OSError as error:
-            raise RunFailed(Fault(reason=f"cannot write: {error.strerror}", where=str(self.path))) from error

@@ -7,7 +7,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import InputRefused, raised_as
 from engage_hri.services.commandline.shell.outputs import complain
 from engage_hri.services.runtime.installation import extra_command
 
@@ -20,12 +20,9 @@ if TYPE_CHECKING:
 
 def needed() -> None:
     """Check that recordings can be read and written. Raises InputRefused."""
-    try:
+    with raised_as(InputRefused, ImportError, "", "recordings need mcap", extra_command("record")):
         import mcap.records  # noqa: F401
         import zstandard  # noqa: F401
-    except ImportError as error:
-        fault = Fault(reason=f"recordings need mcap: {error}", advice=extra_command("record"))
-        raise InputRefused(fault) from error
 
 
 def opened(path: Path) -> "Recording":

@@ -11,7 +11,7 @@ from msgspec import Struct
 
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents import json_codec
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, raised_as
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.references import is_id
 from engage_hri.schemas.world import World
@@ -73,11 +73,7 @@ def still(world: World, *, is_attentive: bool = False) -> Service:
 
 
 def _bytes(path: Path) -> bytes:
-    try:
+    with raised_as(InputRefused, OSError, path, advice="check the path"):
         if path != STDIN:
             return path.read_bytes()
         return b"" if sys.stdin is None else sys.stdin.buffer.read()
-    except OSError as error:
-        raise InputRefused(
-            Fault(reason=error.strerror or str(error), where=str(path), advice="check the path")
-        ) from error

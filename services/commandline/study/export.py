@@ -8,7 +8,7 @@ from urllib.parse import quote
 
 import typer
 
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, raised_as
 from engage_hri.services.commandline.shell.process import DONE
 from engage_hri.services.commandline.shell.recording_file import opened
 from engage_hri.services.commandline.shell.sources import STDIN
@@ -50,10 +50,8 @@ def main(options: Options) -> int:
             raise InputRefused(Fault(reason="there is such a file", where=str(path), advice="--overwrite"))
     recording = opened(options.file)
     for name, path in paths.items():
-        try:
+        with raised_as(InputRefused, OSError, path, "cannot write"):
             path.write_bytes(_made(name, path, recording, options))
-        except OSError as error:
-            raise InputRefused(Fault(reason=f"cannot write: {error.strerror}", where=str(path))) from error
         print(path)
     return DONE
 

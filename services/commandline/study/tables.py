@@ -9,7 +9,7 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.faults import Fault, InputRefused, RunFailed, raised_as
 from engage_hri.services.runtime.installation import extra_command
 from engage_hri.services.study import summary
 from engage_hri.services.study.hypotheses import HypothesisResult
@@ -30,10 +30,8 @@ class Folder:
     def __init__(self, path: Path, names: Collection[str], *, overwrite: bool) -> None:
         self.path = path
         self._names = names
-        try:
+        with raised_as(InputRefused, OSError, path, "cannot be made"):
             path.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputRefused(Fault(reason=f"cannot be made: {error.strerror}", where=str(path))) from error
         if not os.access(path, os.W_OK | os.X_OK):
             raise InputRefused(Fault(reason="cannot be written to", where=str(path)))
         present = [name for name in names if (path / name).exists()]
@@ -45,16 +43,13 @@ class Folder:
     def write(self, files: dict[str, bytes]) -> None:
         """Write these files, and remove the others of `names`. Raises RunFailed."""
         for name in self._names:
-            try:
+            with raised_as(RunFailed, OSError, self.path / name, "cannot write"):
                 if name in files:
                     part = self.path / f".{name}.part"
                     part.write_bytes(files[name])
                     part.replace(self.path / name)
                 else:
                     (self.path / name).unlink(missing_ok=True)
-            except OSError as error:
-                fault = Fault(reason=f"cannot write: {error.strerror}", where=str(self.path / name))
-                raise RunFailed(fault) from error
 
 
 class StudyReport:
@@ -96,11 +91,8 @@ class StudyReport:
 
 def _plotting() -> Draw:
     """Import the function that draws. Raises InputRefused without matplotlib."""
-    try:
+    with raised_as(InputRefused, ImportError, "", "plots need matplotlib", extra_command("study")):
         from engage_hri.services.study.plots import draw
-    except ImportError as error:
-        fault = Fault(reason=f"plots need matplotlib: {error}", advice=extra_command("study"))
-        raise InputRefused(fault) from error
     return draw
 
 

@@ -20,7 +20,7 @@ import msgspec
 import typer
 from msgspec import Struct
 
-from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.faults import Fault, InputRefused, RunFailed, raised_as
 from engage_hri.schemas.text import utf8
 from engage_hri.services.commandline.shell.options import Configured
 from engage_hri.services.commandline.shell.outputs import Terminal, print_format
@@ -130,11 +130,8 @@ def _spoken(given: list[Path]) -> Iterator[SpokenFile]:
             raise InputRefused(Fault(reason="there is no FILE.wav in it", where=str(folder)))
     for path in (each for one in given for each in (sorted(one.glob("*.wav")) if one.is_dir() else [one])):
         text = path.with_suffix(".txt")
-        try:
+        with raised_as(InputRefused, OSError, text, advice=f"write what is said in {path.name} into {text.name}"):
             said = utf8(text.read_bytes(), str(text)).strip()
-        except OSError as error:
-            advice = f"write what is said in {path.name} into {text.name}"
-            raise InputRefused(Fault(reason=error.strerror or str(error), where=str(text), advice=advice)) from error
         if not _plain(said):
             raise InputRefused(Fault(reason="no words", where=str(text)))
         yield SpokenFile(str(path), said, "")

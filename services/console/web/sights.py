@@ -26,8 +26,7 @@ from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.console.web.links import NONSENSE, TOO_MUCH, PageLinks
 from engage_hri.services.console.web.visitor import Visitor
-from engage_hri.services.runtime.packages import data_folder
-from engage_hri.services.runtime.parcels import PARCELS
+from engage_hri.services.runtime.parcels import PARCELS, data_folder
 
 MOST_PICTURES = 60
 """Pictures in a second that a page may tell of."""

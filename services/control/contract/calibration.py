@@ -20,7 +20,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from engage_hri.schemas.body import Estimate, Ray
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import InputRefused, raised_as
 from engage_hri.schemas.text import utf8
 from engage_hri.schemas.units import Degrees, Radians
 from engage_hri.services.control.contract.body import Body
@@ -73,13 +73,9 @@ def read(file: str) -> Calibration:
     """Read a file; empty: one that changes nothing. Raises InputRefused."""
     if not file:
         return Calibration()
-    try:
+    advice = "it is in `control.calibration`; `engage calibrate body` makes one"
+    with raised_as(InputRefused, OSError, file, advice=advice), raised_as(InputRefused, msgspec.DecodeError, file):
         return msgspec.toml.decode(utf8(Path(file).read_bytes(), file), type=Calibration)
-    except OSError as error:
-        advice = "it is in `control.calibration`; `engage calibrate body` makes one"
-        raise InputRefused(Fault(reason=error.strerror or str(error), where=file, advice=advice)) from error
-    except msgspec.DecodeError as error:
-        raise InputRefused(Fault(reason=str(error), where=file)) from error
 
 
 def written(calibration: Calibration, body: str, comments: Mapping[str, Sequence[str]]) -> str:

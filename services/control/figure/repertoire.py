@@ -18,7 +18,7 @@ import msgspec
 from msgspec import Meta, Struct
 
 from engage_hri.schemas.behaviors import Hand
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, raised_as
 from engage_hri.schemas.text import utf8
 from engage_hri.schemas.units import Degrees
 from engage_hri.schemas.vocabulary import is_defined, normal
@@ -283,10 +283,8 @@ class Repertoire:
 
 
 def _read(text: str, file: str) -> dict[str, Any]:
-    try:
+    with raised_as(InputRefused, (ValueError, RecursionError), file, "not TOML", ADVICE):
         return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputRefused(Fault(reason=f"not TOML: {error}", where=file, advice=ADVICE)) from error
 
 
 def _known(name: str, prefix: str, file: str) -> Table:
@@ -345,8 +343,6 @@ def repertoire_of(config: ControlConfig) -> Repertoire:
 
 
 def _text_of(file: str) -> str:
-    try:
+    advice = "it is in `control.repertoire`; a relative path counts from the folder of the process"
+    with raised_as(InputRefused, OSError, file, advice=advice):
         return utf8(Path(file).read_bytes(), file)
-    except OSError as error:
-        advice = "it is in `control.repertoire`; a relative path counts from the folder of the process"
-        raise InputRefused(Fault(reason=error.strerror or str(error), where=file, advice=advice)) from error

@@ -17,7 +17,7 @@ from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Speech
 from engage_hri.schemas.body_faults import BodyFault
-from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.faults import InputRefused, RunFailed, raised_as
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.body import (
     BehaviorRefused,
@@ -104,11 +104,9 @@ class SoundingVoice(Speaker):
 
     def _file(self) -> WavFile:
         name, origin = self._settings.file, self._loop.time() if self._is_real else 0.0
-        try:
+        advice = "it is the `file` of the voice; a relative path counts from the folder of the process"
+        with raised_as(RunFailed, OSError, name, advice=advice):
             return WavFile(open(name, "wb", buffering=0), name, self._studio.rate, origin, self._loop.time)
-        except OSError as error:
-            advice = "it is the `file` of the voice; a relative path counts from the folder of the process"
-            raise RunFailed(Fault(reason=error.strerror or str(error), where=name, advice=advice)) from error
 
     def _tell_fault(self, outlet: Outlet) -> None:
         if outlet.fault is not None:

@@ -29,7 +29,7 @@ from engage_hri.services.perception.eyes.watching import (
     SourceOrder,
     Watching,
 )
-from engage_hri.services.runtime.packages import data_folder
+from engage_hri.services.runtime.parcels import data_folder
 from engage_hri.services.runtime.service import Ready, tell_settings
 
 LOOK_AROUND: Seconds = 0.5

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from engage_hri.schemas.faults import EngageError, Fault, InputRefused
+from engage_hri.schemas.faults import EngageError, Fault, InputRefused, raised_as
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.perception.child import PipedProcess
 from engage_hri.services.perception.hearing.config import PAGE
@@ -58,11 +58,8 @@ def read_file(path: Path, channels: int) -> Samples:
 
     channels: that it has to have at least; 1: the mean of all that it has, since a voice may be in any of them.
     """
-    try:
-        with path.open("rb") as file:
-            samples = read_wav(file, str(path))
-    except OSError as error:
-        raise InputRefused(Fault(reason=error.strerror or str(error), where=str(path))) from error
+    with raised_as(InputRefused, OSError, path), path.open("rb") as file:
+        samples = read_wav(file, str(path))
     if samples.shape[1] < channels:
         reason = f"it has {samples.shape[1]} channels, and `hearing.people` names {channels}"
         raise InputRefused(Fault(reason=reason, where=str(path)))

@@ -62,7 +62,7 @@ from engage_hri.services.perception.hearing.voice import (
     silero,
 )
 from engage_hri.services.runtime.installation import extra_command
-from engage_hri.services.runtime.packages import data_folder
+from engage_hri.services.runtime.parcels import data_folder
 
 VISITOR = "visitor"
 """Id of the person who speaks where nobody tells of any."""

@@ -5,7 +5,7 @@ from pathlib import Path
 import msgspec
 
 from engage_hri.schemas.advice import suggestion
-from engage_hri.schemas.faults import Fault, InputRefused
+from engage_hri.schemas.faults import Fault, InputRefused, raised_as
 from engage_hri.schemas.tables import TaskTable
 from engage_hri.services.runtime.installation import TABLES, offers
 
@@ -20,28 +20,20 @@ def task_table(task: str) -> TaskTable:
     if task in known:
         table: TaskTable = known[task].load()()
         return table
-    try:
-        return msgspec.toml.decode(Path(task).read_bytes(), type=TaskTable)
-    except OSError as error:
-        advice = suggestion(task, [*known]) or f"a file, or one of {', '.join(sorted(known))}"
-        raise InputRefused(
-            Fault(reason=error.strerror or str(error), where=f"pieces.task: {task}", advice=advice)
-        ) from error
-    except msgspec.DecodeError as error:
-        advice = "docs/pieces.md shows such a file"
-        raise InputRefused(Fault(reason=str(error), where=task, advice=advice)) from error
+    advice = suggestion(task, [*known]) or f"a file, or one of {', '.join(sorted(known))}"
+    with raised_as(InputRefused, OSError, f"pieces.task: {task}", advice=advice):
+        text = Path(task).read_bytes()
+    with raised_as(InputRefused, msgspec.DecodeError, task, advice="docs/pieces.md shows such a file"):
+        return msgspec.toml.decode(text, type=TaskTable)
 
 
 def read_palette(path: str, table: TaskTable) -> Palette:
     """Read the colors of the pieces of a table. Raises InputRefused: there is no such file, or it lacks one."""
     advice = "lay out the pieces as the task begins, and: engage calibrate colors"
-    try:
-        palette: Palette = msgspec.toml.decode(Path(path).read_bytes(), type=Palette)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InputRefused(Fault(reason=reason, where=f"pieces.colors: {path}", advice=advice)) from error
-    except msgspec.DecodeError as error:
-        raise InputRefused(Fault(reason=str(error), where=path, advice=advice)) from error
+    with raised_as(InputRefused, OSError, f"pieces.colors: {path}", advice=advice):
+        text = Path(path).read_bytes()
+    with raised_as(InputRefused, msgspec.DecodeError, path, advice=advice):
+        palette: Palette = msgspec.toml.decode(text, type=Palette)
     needed = {TABLE, *(form.color for form in table.pieces)}
     if missing := sorted(needed - palette.keys()):
         raise InputRefused(Fault(reason=f"it has no color {', '.join(missing)}", where=path, advice=advice))

@@ -19,7 +19,7 @@ from engage_hri.services.perception.eyes.watching import OutsideWatching, Source
 from engage_hri.services.perception.testing.laws import Evidence, Finding, Told, TrueLook
 from engage_hri.services.recording.disk import read
 from engage_hri.services.recording.reading import RecordingTimes
-from engage_hri.services.runtime.packages import data_folder
+from engage_hri.services.runtime.parcels import data_folder
 from engage_hri.services.runtime.service import Ready, running
 
 KINDS = (HeadPose, Looked, ActorFound, ActorLost, Fault)

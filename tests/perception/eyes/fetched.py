@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from engage_hri.services.runtime.packages import download, install
+from engage_hri.services.commandline.robot.eyes import download, install
 from engage_hri.services.runtime.parcels import PARCELS, Parcel
 
 FOLDER = Path(__file__).parents[3] / "build/eyes"

@@ -10,8 +10,8 @@ from typing import Literal
 import pytest
 
 from engage_hri.schemas.faults import InputRefused, RunFailed
-from engage_hri.services.runtime.packages import data_folder, download, install
-from engage_hri.services.runtime.parcels import FACE_MODELS, PAGE_RUNTIME, Parcel
+from engage_hri.services.commandline.robot.eyes import download, install
+from engage_hri.services.runtime.parcels import FACE_MODELS, PAGE_RUNTIME, Parcel, data_folder
 from tests.cli.command import engage
 
 
