@@ -258,8 +258,7 @@ class Listener:
 
     def _is_listening(self, speech: SignPart) -> bool | None:
         """True if the words of a speech are a listener's; None: there are none, as far as is known."""
-        words = self._writer.text_of(self._id, speech.since)
-        return is_listening(words) if says_words(words) else None
+        return is_listening(speech.words) if says_words(speech.words) else None
 
     def _is_noise(self, speech: SignPart) -> bool:
         """True if no words of a speech are known, where they would be."""

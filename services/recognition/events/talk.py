@@ -161,7 +161,8 @@ class Talk(KindRecognizer):
         if self.speeches.going_on is not None:
             self._falls_silent(at)  # it was begun by another id, of which no end has come
         speech = self.speeches.begin(at, confidence, face)
-        speech.told, speech.words = self._scene.told_to(self.id, at), self._writer.text_of(self.id, at)
+        speech.told = self._scene.told_to(self.id, at)
+        speech.words = speech.part.words = self._writer.text_of(self.id, at)
         # What waits in line may be the robot's own turn, so that only the scene knows that it has begun.
         said = self._scene.robot_spoken
         is_into_words = said is not None and said.since <= at
@@ -229,6 +230,8 @@ class Talk(KindRecognizer):
             self._writer.interject_again(self.id, since, at)
             return
         self.speeches.hear(speech, words, told)
+        if at <= speech.words_until + ROUNDING:
+            speech.part.words = speech.words
         if not speech.is_heard or speech.is_noise:
             self._has_news(speech, at)
         self.take(at, lambda talk: self._judge(talk, speech, at))
@@ -236,6 +239,7 @@ class Talk(KindRecognizer):
 
     def _judge(self, talk: Dialogue, speech: OwnSpeech, at: Seconds) -> None:
         """Take the words of a speech in their turn; if they decide nothing they are told all the same."""
+        speech.part.words = speech.words
         talk.understand(speech.part, at)
         self._writer.interject_again(self.id, speech.since, at)
         if speech.is_noise and speech.is_heard and says_words(speech.words):
@@ -306,7 +310,7 @@ class Talk(KindRecognizer):
     def _begin_again(self, speech: OwnSpeech) -> None:
         """Put a speech in line, in its place."""
         since, until, speech.is_heard, speech.is_decided = speech.since, speech.until, False, False
-        speech.part = SignPart("speak", since, speech.part.confidence)
+        speech.part = SignPart("speak", since, speech.part.confidence, words=speech.words)
         self._line.insert(self._place(since), (since, speech))
         if until is not None:
             self._line.insert(self._place(until), (until, self._end_of(speech, until)))
