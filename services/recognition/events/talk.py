@@ -234,12 +234,13 @@ class Talk(KindRecognizer):
             speech.part.words = speech.words
         if not speech.is_heard or speech.is_noise:
             self._has_news(speech, at)
-        self.take(at, lambda talk: self._judge(talk, speech, at))
+        known = speech.words
+        self.take(at, lambda talk: self._judge(talk, speech, known, at))
         self.go_on(at)
 
-    def _judge(self, talk: Dialogue, speech: OwnSpeech, at: Seconds) -> None:
+    def _judge(self, talk: Dialogue, speech: OwnSpeech, words: str, at: Seconds) -> None:
         """Take the words of a speech in their turn; if they decide nothing they are told all the same."""
-        speech.part.words = speech.words
+        speech.part.words = words or speech.part.words
         talk.understand(speech.part, at)
         self._writer.interject_again(self.id, speech.since, at)
         if speech.is_noise and speech.is_heard and says_words(speech.words):
