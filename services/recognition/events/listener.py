@@ -154,13 +154,15 @@ class Listener:
     def robots_turn_ends(self, at: Seconds, reading: InterjectionReading = "answer") -> None:
         """Take what goes on of the sign for the answer, because the robot's turn is over.
 
-        Of several parts it is the one that began first. A gesture that answers nothing here stays what it is, and one
-        beside a speech whose words may come waits for them: that began before.
+        Of several parts it is the one that began first. A gesture that answers nothing here stays what it is, as
+        beside the robot's words to others, and one beside a speech whose words may come waits for them: that began
+        before.
         """
         sign = self.sign
+        pair = self._exchange.pair
         for part in sign.going_on() if sign is not None else ():
             is_speech = part.action == "speak"
-            if not self._is_echo(part) if is_speech else self._exchange.pair.may_be_answered_with(part.action):
+            if not self._is_echo(part) if is_speech else not self.is_beside and pair.may_be_answered_with(part.action):
                 is_gesture_of_answer = reading == "answer" and not is_speech
                 if sign is not None and is_gesture_of_answer and self._awaits_words_before(sign, part, at):
                     sign.outlasting = part
