@@ -169,7 +169,8 @@ class Talk(KindRecognizer):
         is_to_person = said is not None and said.is_to(self.id)
         speech.is_beside = is_into_words and not is_to_person
         is_asked = self.asked_since < inf or self._conversation.exchange.pair.robot_holds_turn
-        is_in_pause = is_asked and self._scene.turn is not None and self.id in self._scene.turn[1]
+        turn = self._scene.turn
+        is_in_pause = is_asked and turn is not None and turn.asks and self.id in turn.to
         may_be_in_turn = (is_into_words and is_to_person) or is_in_pause
         is_into_turn = may_be_in_turn if self._line else self._conversation.is_into_turn(at)
         is_line = self._scene.lines.get(self.id) == at
@@ -230,8 +231,9 @@ class Talk(KindRecognizer):
             self._writer.interject_again(self.id, since, at)
             return
         self.speeches.hear(speech, words, told)
-        if at <= speech.words_until + ROUNDING:
-            speech.part.words = speech.words
+        is_waited_for = bool(speech.company) or self._conversation.listener.listens_to(speech.part)
+        if is_waited_for and at <= speech.words_until + ROUNDING:
+            speech.part.words = speech.words  # what is known late has happened early
         if not speech.is_heard or speech.is_noise:
             self._has_news(speech, at)
         known = speech.words
