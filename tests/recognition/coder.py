@@ -211,7 +211,7 @@ class Coder:
             ]  # fmt: skip
             following = sets[number + 1][0].since if number + 1 < len(sets) else (1e9, 0)
             over = max(each.until for each in every if sign[0].since <= each.since <= sign[-1].until)
-            late = [each for each in sign if self._is_told_late(each, following)]
+            late = [each for each in sign if self._is_told_late(each, following, over)]
             is_brief = any(over < each.known for each in late if each.known is not None) and not goes_on
             parts = [each for each in sign if each not in late and self._shows(each)]
             interrupts = [
@@ -303,11 +303,14 @@ class Coder:
         is_noise = sign.action == "speak" and self._timeline.is_worded and sign.known is None
         return sign.action != "point" and not is_noise
 
-    def _is_told_late(self, speech: Span, following: Instant) -> bool:
-        """True if a sound has been told as noise when its words come. following: when the next sign begins."""
+    def _is_told_late(self, speech: Span, following: Instant, over: Instant = BEFORE) -> bool:
+        """True if a sound has been told as noise when its words come.
+
+        following: when the next sign begins. over: when the sign is over, of which it is part, and told.
+        """
         if speech.known is None or speech.seconds > WORDS_WAIT + ROUND:
             return False
-        return following < speech.known or speech.known[0] > speech.since[0] + WORDS_WAIT + ROUND
+        return following < speech.known or speech.known[0] > max(speech.since[0] + WORDS_WAIT, over[0]) + ROUND
 
     def _goes_with_words(self, sign: Span, turn: Turn) -> bool:
         """True for a gesture beside the person's own words, if these are no listener's: it says nothing more."""
@@ -392,6 +395,9 @@ class Coder:
         at = sign.since[0]
         if side.unanswered is not None and self._has_spoken(side.unanswered, sign):
             side.unanswered = None
+        if side.asked is not None and not self._is_known_by_limit(sign, side.asked):
+            self._pair_of(side.asked, side, "failed")
+            side.asked, side.unanswered = None, side.asked
         if side.asked is not None:
             turn = side.asked
             self._pair_of(turn, side, "succeeded", delay=at - turn.until[0])
@@ -414,6 +420,11 @@ class Coder:
             else:
                 side.own.append(sign)
 
+    def _is_known_by_limit(self, sign: Span, asked: Turn) -> bool:
+        """True if a sign answers in time: words for which nobody has waited do not after the limit."""
+        is_waited_for = sign.known is None or sign.known[0] <= sign.until[0] + WORDS_AFTER
+        return is_waited_for or (sign.known is not None and sign.known[0] <= asked.until[0] + self._limit)
+
     def _begins_too(self, side: Side, sign: Span) -> bool:
         """True if a person begins to answer in the very instant of another's sign."""
         signs = [each for each in self._timeline.spans if each.who == side.person and each.to == ROBOT]
@@ -435,8 +446,7 @@ class Coder:
         last = (side.own[-1].until if side.own else BEFORE)[0]
         at = sign.since[0]
         waiting = [each for each in asked if last < each.until[0] < at]
-        if sign.known is not None and sign.known[0] > sign.until[0] + WORDS_AFTER:  # nobody waited for these words
-            waiting = [each for each in waiting if sign.known[0] <= each.until[0] + self._limit]
+        waiting = [each for each in waiting if self._is_known_by_limit(sign, each)]
         return max(waiting, key=lambda each: each.until, default=None)
 
 

@@ -83,6 +83,8 @@ class AdjacencyPair(Machine):
         self._third_turn_until: Seconds = 0.0
         self._unanswered: OngoingEvent | None = None
         """The robot's last pair, if its limit passed without an answer and nobody has begun a turn since."""
+        self._late_answer: Action | None = None
+        """What the person answers with, late, as long as that goes on."""
         self._forgotten_at: Seconds = NEVER
         """When the robot has first said something after that limit; until then, when it has last done so."""
         self.interrupted_until: Seconds = NEVER
@@ -97,6 +99,11 @@ class AdjacencyPair(Machine):
     def is_interrupted(self) -> bool:
         """True if the first turn, which goes on, has been answered."""
         return self.state == INTERRUPTED
+
+    @property
+    def is_being_answered(self) -> bool:
+        """True while one answers the other: what the person does meanwhile is part of that."""
+        return self.state in (INTERRUPTED, RESPONDING) or (self.state == IDLE and self._late_answer is not None)
 
     @property
     def interrupted_since(self) -> Seconds:
@@ -301,6 +308,7 @@ class AdjacencyPair(Machine):
         if event is None or self._turn_end is None or action not in event.accept or at > self._forgotten_at:
             return False
         self.forget_unanswered()
+        self._late_answer = action
         event.rests_on(confidence)
         event.response, event.delay = action, at - self._turn_end
         event.spoken = _spoken(event.responder, action, at)
@@ -367,6 +375,8 @@ class AdjacencyPair(Machine):
 
     def ends(self, action: Action, at: Seconds, *, by_robot: bool) -> None:
         """End an action of person or robot: it may be the person's first turn, or the response."""
+        if not by_robot and action == self._late_answer:
+            self._late_answer = None
         if self.event is None:
             return
         if by_robot == self._by_robot:

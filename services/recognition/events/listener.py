@@ -117,6 +117,11 @@ class Listener:
         return sign.deadline(self.longest)
 
     @property
+    def waits_until(self) -> Seconds:
+        """Time until which a sign that is over waits for its words, whatever has come since; infinite: it does not."""
+        return inf if self.sign is None or self.sign.until is None else self.deadline
+
+    @property
     def longest(self) -> Seconds:
         """Time after which a voice that goes on in the robot's turn is no listener's, if it has no words."""
         return WORDS_WAIT if self._scene.is_worded else self._config.backchannel_limit

@@ -102,8 +102,8 @@ class Talk(KindRecognizer):
         in_contact = self.speeches.going_on is not None and self.speeches.going_on.is_to(self._scene.robot)
         if not self._line:
             return self._conversation.deadline, in_contact
-        first = self._undecided_first()
-        return inf if first is None else self._decided_at(first), in_contact
+        first, waits = self._undecided_first(), self._conversation.listener.waits_until
+        return waits if first is None else min(self._decided_at(first), waits), in_contact
 
     def pass_time(self, at: Seconds) -> None:
         if self._line:
@@ -179,8 +179,6 @@ class Talk(KindRecognizer):
         speech.is_open = is_into_turn or speech.is_beside
         self.speeches.is_certain(speech, at)
         self.speeches.may_interrupt(speech, face, at)
-        if not self._line:
-            self._conversation.listener.next_begins()
         self._queue(at, speech)
 
     def _falls_silent(self, at: Seconds) -> None:
@@ -231,13 +229,13 @@ class Talk(KindRecognizer):
             self._writer.interject_again(self.id, since, at)
             return
         self.speeches.hear(speech, words, told)
-        is_waited_for = bool(speech.company) or self._conversation.listener.listens_to(speech.part)
-        if is_waited_for and at <= speech.words_until + ROUNDING:
-            speech.part.words = speech.words  # what is known late has happened early
         if not speech.is_heard or speech.is_noise:
             self._has_news(speech, at)
-        known = speech.words
-        self.take(at, lambda talk: self._judge(talk, speech, known, at))
+        known, is_waited_for = speech.words, speech.company or self._conversation.listener.listens_to(speech.part)
+        if is_waited_for and at <= speech.words_until + ROUNDING:
+            self.take_early(since, lambda talk: self._judge(talk, speech, known, at))
+        else:
+            self.take(at, lambda talk: self._judge(talk, speech, known, at))
         self.go_on(at)
 
     def _judge(self, talk: Dialogue, speech: OwnSpeech, words: str, at: Seconds) -> None:
@@ -489,12 +487,11 @@ class Talk(KindRecognizer):
 
     def go_on(self, now: Seconds) -> None:
         """Tell all in line up to the next speech of which it is not known to whom it is."""
+        if self._line and (waits := self._conversation.listener.waits_until) <= now:
+            self._conversation.pass_time(waits)
         while self._line:
             at, item = self._line[0]
             self._catch_up(at)
-            if isinstance(item, OwnSpeech):
-                self._conversation.listener.next_begins()
-                self._catch_up(at)  # the sign may have held the pair
             if (speech := self._undecided_first()) is not None:
                 if self._decided_at(speech) > now:
                     break
