@@ -118,7 +118,7 @@ class Listener:
 
     @property
     def waits_until(self) -> Seconds:
-        """Time until which a sign that is over waits for its words, whatever has come since; infinite: it does not."""
+        """Time until which a sign that is over waits for its words, whatever has come since; infinite: none does."""
         return inf if self.sign is None or self.sign.until is None else self.deadline
 
     @property
@@ -164,10 +164,10 @@ class Listener:
         before.
         """
         sign = self.sign
-        pair = self._exchange.pair
         for part in sign.going_on() if sign is not None else ():
             is_speech = part.action == "speak"
-            if not self._is_echo(part) if is_speech else not self.is_beside and pair.may_be_answered_with(part.action):
+            may_answer = not self.is_beside and self._exchange.pair.may_be_answered_with(part.action)
+            if not self._is_echo(part) if is_speech else may_answer:
                 is_gesture_of_answer = reading == "answer" and not is_speech
                 if sign is not None and is_gesture_of_answer and self._awaits_words_before(sign, part, at):
                     sign.outlasting = part
@@ -215,9 +215,10 @@ class Listener:
         for speech in sign.speeches:
             self._tell(speech, until)
             speech.taken_for = "noise" if self._is_noise(speech) else "backchannel"
-        parts = [part for part in sign.parts if part.taken_for != "noise"]
-        if all(part.action == "point" for part in parts):
-            return  # a point in the robot's turn directs the gaze, and says nothing
+        # A point in the robot's turn directs the gaze, and says nothing.
+        parts = [part for part in sign.parts if part.taken_for != "noise" and part.action != "point"]
+        if not parts:
+            return
         told = ListenerSign(parts)
         self._backchannel.speaks(
             OngoingEvent(
@@ -234,7 +235,7 @@ class Listener:
         """Take a part of the sign as a turn of the person since it began. Speech before it was a listener's."""
         beside: list[Seconds] = []
         for speech in self.sign.speeches if self.sign is not None else ():
-            if speech.since < part.since:
+            if speech.since <= part.since and speech is not part:
                 self._tell(speech, at)
             elif speech is not part:  # it goes on beside the gesture that answers, and is of that answer
                 self._read(speech.since, reading, at)
