@@ -8,8 +8,7 @@ from math import inf
 
 from msgspec.structs import replace
 
-from tests.recognition.coder import BRIEF, FACE_GRACE, ROUND, WORDS_WAIT
-from tests.recognition.floor_coder import is_noise, longest_sound
+from tests.recognition.coder import BRIEF, FACE_GRACE, ROUND, WORDS_WAIT, is_noise, longest_sound
 from tests.recognition.observations import ROBOT
 from tests.recognition.timeline import CALLED, LIMIT, Span, Timeline
 

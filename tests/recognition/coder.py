@@ -79,8 +79,6 @@ class Coder:
         signs = [each for each in self._timeline.spans if each.to == ROBOT and each.action != "look"]
         acts: list[Span | Turn | Absence] = [*signs, *self._timeline.turns, *self._gone]
         for act in self._in_order(acts):
-            for side in self._sides.values():
-                self._expire(side, _known(act)[0])
             if isinstance(act, Turn):
                 self._robot_speaks(act)
                 for side in self._sides.values():
@@ -101,7 +99,9 @@ class Coder:
 
         Unless it is known at once what each says, and to whom: into the robot's words, where perception tells it.
         """
-        for _, together in groupby(sorted(acts, key=_known), key=lambda act: _known(act)[0]):
+        for at, together in groupby(sorted(acts, key=_known), key=lambda act: _known(act)[0]):
+            for side in self._sides.values():
+                self._expire(side, at)
             yield from sorted(together, key=self._is_of_another)
 
     def _is_of_another(self, act: Span | Turn | Absence) -> tuple[bool, bool]:
@@ -254,7 +254,8 @@ class Coder:
                 is_noise = self._timeline.is_worded and not is_known
                 shown = sorted(each.since for each in sign if self._shows(each))
                 shown = shown if is_noise else [speech.since]
-                is_brief = speech.seconds <= (self._longest_sound if self._timeline.is_worded else BRIEF) + ROUND
+                longest = longest_sound(self._timeline) if self._timeline.is_worded else BRIEF
+                is_brief = speech.seconds <= longest + ROUND
                 takes_floor = speech.is_line or (speech.words not in LISTENING if is_known else not is_brief)
                 if speech.until > until or takes_floor:
                     self._turns.add(id(speech))
@@ -270,14 +271,7 @@ class Coder:
 
     def _is_last(self, speech: Span) -> bool:
         """True if words come of a speech, and neither the person nor the robot to them has spoken before they do."""
-        if speech.known is None:
-            return False
-        own = [
-            each.since for each in self._timeline.spans
-            if _speaks_to_robot(each, speech.who) and speech.since < each.since and not self._is_noise(each)
-        ]  # fmt: skip
-        robots = [since for turn in self._timeline.turns if speech.who in turn.to for since, _ in turn.speech]
-        return not any(speech.since < since < speech.known for since in (*own, *robots))
+        return speech.known is not None and not has_spoken_since(speech, self._timeline)
 
     def _is_listening(self, side: Side, turn: Turn) -> bool:
         """True if the robot says a little while the person speaks, and has nothing to answer."""
@@ -379,16 +373,12 @@ class Coder:
         if sign.since >= side.answers_until and not goes_with_words and not self._is_noise(sign):
             self._takes_turn(side, sign)
 
-    @property
-    def _longest_sound(self) -> float:
-        return LONGEST_SOUND_TOLD if self._timeline.tells else LONGEST_SOUND
-
     def _is_noise(self, sign: Span) -> bool:
         """True for a cough, or a laugh: no words come where they would have come, or too late to say anything."""
         is_late = sign.known is not None and sign.known[0] > sign.until[0] + WORDS_AFTER + ROUND
         is_unheard = sign.known is None or (is_late and not self._is_last(sign))
         is_wordless = is_unheard and self._timeline.is_worded and id(sign) not in self._used
-        return sign.action == "speak" and is_wordless and sign.seconds <= self._longest_sound + ROUND
+        return sign.action == "speak" and is_wordless and sign.seconds <= longest_sound(self._timeline) + ROUND
 
     def _takes_turn(self, side: Side, sign: Span) -> None:
         """Read an answer, or words of the person's own."""
@@ -448,6 +438,40 @@ class Coder:
         waiting = [each for each in asked if last < each.until[0] < at]
         waiting = [each for each in waiting if self._is_known_by_limit(sign, each)]
         return max(waiting, key=lambda each: each.until, default=None)
+
+
+def is_noise(one: Span, timeline: Timeline) -> bool:
+    """True for a sound of which no words come where they would have come, or too late to say anything."""
+    if not timeline.is_worded:
+        return False
+    longest, wait = longest_sound(timeline), one.until[0] + WORDS_AFTER
+    for turn in timeline.turns:
+        for since, until in [(turn.since, turn.until)] if one.who in turn.to else turn.speech:
+            if one.to == ROBOT and since < one.since < until:
+                if until < one.until:
+                    return False
+                longest = WORDS_WAIT if one.who in turn.to else longest
+                wait = max(wait, until[0])
+    if one.known is None or (one.known[0] > wait and has_spoken_since(one, timeline)):
+        return one.seconds <= longest + 1e-6
+    return False
+
+
+def longest_sound(timeline: Timeline) -> float:
+    """Longest sound without words that may be none."""
+    return LONGEST_SOUND_TOLD if timeline.tells else LONGEST_SOUND
+
+
+def has_spoken_since(one: Span, timeline: Timeline) -> bool:
+    """True if the person or the robot has begun to say something to the other before the words are known."""
+    assert one.known is not None
+    own = [
+        each.since for each in timeline.spans
+        if each.who == one.who and each.action == "speak" and each.to == ROBOT and one.since < each.since < one.known
+        and not is_noise(each, timeline)
+    ]  # fmt: skip
+    robots = [since for turn in timeline.turns if one.who in turn.to for since, _ in turn.speech]
+    return any(one.since < since < one.known for since in (*own, *robots))
 
 
 def _speaks_to_robot(each: Span, person: str) -> bool:
