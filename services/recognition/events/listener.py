@@ -198,13 +198,13 @@ class Listener:
         if listens is False and (is_new or (in_turn and speech.taken_for == "backchannel")):
             is_over = (self._scene.robot_speaks_since or inf) > speech.since  # the words into which it was said
             self._is_turn(speech, "answer" if is_over and not in_turn else "interruption", at)
-        elif listens and speech.taken_for == "backchannel" and in_turn:
-            self._tell(speech, at)  # it is that of the nod beside it, which has been told
         elif listens and (is_new or self._exchange.pair.was_listening(speech.since)):
             if speech.until is None:
                 self._joins(speech)
             else:
                 self._listens(ListenerSign([speech]), speech.until)
+        elif listens and in_turn and (speech.taken_for == "backchannel" or self._exchange.pair.is_interrupted):
+            self._tell(speech, at)  # it is that of the nod beside it, or more of the answer, which have been told
 
     # -- what it is ---------------------------------------------------------------------------------------------
 

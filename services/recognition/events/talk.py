@@ -124,11 +124,12 @@ class Talk(KindRecognizer):
             is_for_robot = since if speech.is_to(scene.robot) else speech.faces.most_from(scene.robot, since)
             return min(at_last, max(early, is_for_robot))
         if is_known or not (scene.is_worded or scene.tells_addressees):
-            return until
+            return max(until, speech.worded_at)
         is_seen = speech.faces.most(since) == scene.robot and not scene.tells_addressees
         is_seen = is_sign and (is_seen or speech.is_to(scene.robot))
         over = until + (0.0 if is_seen else WORDS_AFTER)
-        return max(over, since + WORDS_WAIT) if is_sign or speech.is_beside else over
+        over = max(over, since + WORDS_WAIT) if is_sign or speech.is_beside else over
+        return over + ROUNDING  # words that come in this very instant count
 
     # -- the person ---------------------------------------------------------------------------------------------
 
@@ -228,7 +229,7 @@ class Talk(KindRecognizer):
         if speech is None:
             self._writer.interject_again(self.id, since, at)
             return
-        self.speeches.hear(speech, words, told)
+        self.speeches.hear(speech, words, told, at)
         if not speech.is_heard or speech.is_noise:
             self._has_news(speech, at)
         known, is_waited_for = speech.words, speech.company or self._conversation.listener.listens_to(speech.part)
@@ -257,11 +258,12 @@ class Talk(KindRecognizer):
             speech.is_noise = speech.is_heard = False  # more of the words may still call it
             speech.part.taken_for = ""
         elif not speech.is_heard and not any(each is speech for _, each in self._line):
-            speech.is_noise, speech.is_heard = False, True
+            is_over_sign = speech.until is not None and (speech.is_into_turn or speech.is_beside)
+            speech.is_noise, speech.is_heard = is_over_sign, True
             speech.part.until = speech.until
             if speech.until is None:
                 self.take_early(speech.since, lambda talk: talk.speaks(speech.part, beside=speech.is_beside))
-            elif speech.is_into_turn or speech.is_beside:
+            elif is_over_sign:
                 speech.part.taken_for = "noise"  # as such it is judged by its words
             elif self._scene.is_last(self.id, speech.since):  # what either has said since may wait in line
                 self.take_early(speech.since, lambda talk: talk.exchange.take(speech.part))
