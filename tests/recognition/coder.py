@@ -304,7 +304,9 @@ class Coder:
         """
         if speech.known is None or speech.seconds > WORDS_WAIT + ROUND:
             return False
-        return following < speech.known or speech.known[0] > max(speech.since[0] + WORDS_WAIT, over[0]) + ROUND
+        # Of several people each next sign waits in line until the words of the one before have come.
+        is_next = len(self._sides) == 1 and following < speech.known
+        return is_next or speech.known[0] > max(speech.since[0] + WORDS_WAIT, over[0]) + ROUND
 
     def _goes_with_words(self, sign: Span, turn: Turn) -> bool:
         """True for a gesture beside the person's own words, if these are no listener's: it says nothing more."""

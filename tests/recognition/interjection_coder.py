@@ -57,8 +57,10 @@ def judged(timeline: Timeline, told: list[Interjection]) -> Iterator[str]:
         life = lives.get(key, [])
         coded = _reading(one, timeline)
         last = life[-1].reading if life else ""
-        if one.is_beside and (coded == {"noise"} or timeline.tells == "late"):
-            coded = {*coded, ""}  # to whom it is may never be known, or when the robot is silent
+        if one.is_beside and timeline.tells == "late":
+            coded = {*coded, ""}  # to whom it is may be known when the robot is silent
+        elif coded == {"noise"} and (one.is_beside or _looks_at_neighbor(one.speech, timeline)):
+            coded = {*coded, ""}  # to whom it is may never be known
         if last not in coded:
             yield f"{key[0]} at {key[1]}{' beside' * one.is_beside}: told {last!r}, coded {sorted(coded)}"
         elif (
