@@ -6,6 +6,7 @@ docs/recognition.md.
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
+from math import inf
 from typing import Any
 
 from msgspec import Struct
@@ -72,6 +73,8 @@ class Coder:
         """Signs that have been read within a turn of the robot, by `id`."""
         self._turns: set[int] = set()
         """Those that turned out to be turns of the person, to be read when they come."""
+        self._late: list[Span] = []
+        """Those that are known to be turns only when their words come, for which nobody has waited."""
         self._gone = [each for each in timeline.away if each.until[0] - each.since[0] >= FACE_GRACE]
 
     def events(self) -> list[Coded]:
@@ -100,9 +103,20 @@ class Coder:
         Unless it is known at once what each says, and to whom: into the robot's words, where perception tells it.
         """
         for at, together in groupby(sorted(acts, key=_known), key=lambda act: _known(act)[0]):
+            yield from self._late_words(at)
             for side in self._sides.values():
                 self._expire(side, at)
             yield from sorted(together, key=self._is_of_another)
+        yield from self._late_words(inf)
+
+    def _late_words(self, until: float) -> Iterator[Span]:
+        """Speeches of which nothing was told before their words, which come until then: what waits may be theirs."""
+        while self._late and (first := min(self._late, key=_words_come)) and _words_come(first) <= until:
+            self._late.remove(first)
+            self._turns.add(id(first))
+            for side in self._sides.values():
+                self._expire(side, _words_come(first))
+            yield first
 
     def _is_of_another(self, act: Span | Turn | Absence) -> tuple[bool, bool]:
         speech = [each for turn in self._timeline.turns for each in turn.speech]
@@ -214,9 +228,11 @@ class Coder:
             late = [each for each in sign if self._is_told_late(each, following, over)]
             is_brief = any(over < each.known for each in late if each.known is not None) and not goes_on
             parts = [each for each in sign if each not in late and self._shows(each)]
-            interrupts = [
-                each for each in sign
-                if each.action == "speak" and self._interrupts(each, turn, is_noise=not parts)
+            interrupts = [each for each in sign if each.action == "speak" and self._interrupts(each, turn)]
+            self._late += [
+                each for each in late
+                if not parts and each not in interrupts and not self._is_known_in(each, turn)
+                and each.words not in LISTENING and self._is_last(each)
             ]  # fmt: skip
             answers = sorted([*goes_on, *interrupts], key=lambda each: each.since)
             if any(each.action == "speak" for each in answers) or (answers and not found):
@@ -257,7 +273,9 @@ class Coder:
                 longest = longest_sound(self._timeline) if self._timeline.is_worded else BRIEF
                 is_brief = speech.seconds <= longest + ROUND
                 takes_floor = speech.is_line or (speech.words not in LISTENING if is_known else not is_brief)
-                if speech.until > until or takes_floor:
+                if speech.until <= until and takes_floor and is_known and not is_in_time:
+                    self._late.append(speech)
+                elif speech.until > until or takes_floor:
                     self._turns.add(id(speech))
                 elif shown:
                     self._note("backchannel", ROBOT, side.person, shown[0][0], "completed")
@@ -345,16 +363,12 @@ class Coder:
         is_told_late = len(self._sides) > 1 and self._is_heard(answer) and answer.words not in LISTENING
         return answer.action == "speak" and (decided < turn.until[0] - ROUND or is_told_late)
 
-    def _interrupts(self, speech: Span, turn: Turn, *, is_noise: bool = False) -> bool:
-        """True if a speech that is over within the robot's turn takes the floor.
-
-        is_noise: nothing is told of the sign unless words come, so that these may come after the turn.
-        """
+    def _interrupts(self, speech: Span, turn: Turn) -> bool:
+        """True if a speech that is over within the robot's turn takes the floor, as far as is known in time."""
         if speech.is_line:
             return True
         is_open = turn.kind == "asks" or speech.seconds <= WORDS_WAIT + ROUND
-        is_noise &= speech.seconds <= WORDS_WAIT + ROUND
-        if is_open and (self._is_known_in(speech, turn) or (is_noise and self._is_last(speech))):
+        if is_open and self._is_known_in(speech, turn):
             return speech.words not in LISTENING
         return speech.seconds > (WORDS_WAIT if self._timeline.is_worded else BRIEF) + ROUND
 
@@ -387,9 +401,6 @@ class Coder:
         at = sign.since[0]
         if side.unanswered is not None and self._has_spoken(side.unanswered, sign):
             side.unanswered = None
-        if side.asked is not None and not self._is_known_by_limit(sign, side.asked):
-            self._pair_of(side.asked, side, "failed")
-            side.asked, side.unanswered = None, side.asked
         if side.asked is not None:
             turn = side.asked
             self._pair_of(turn, side, "succeeded", delay=at - turn.until[0])
@@ -412,11 +423,6 @@ class Coder:
             else:
                 side.own.append(sign)
 
-    def _is_known_by_limit(self, sign: Span, asked: Turn) -> bool:
-        """True if a sign answers in time: words for which nobody has waited do not after the limit."""
-        is_waited_for = sign.known is None or sign.known[0] <= sign.until[0] + WORDS_AFTER
-        return is_waited_for or (sign.known is not None and sign.known[0] <= asked.until[0] + self._limit)
-
     def _begins_too(self, side: Side, sign: Span) -> bool:
         """True if a person begins to answer in the very instant of another's sign."""
         signs = [each for each in self._timeline.spans if each.who == side.person and each.to == ROBOT]
@@ -438,7 +444,6 @@ class Coder:
         last = (side.own[-1].until if side.own else BEFORE)[0]
         at = sign.since[0]
         waiting = [each for each in asked if last < each.until[0] < at]
-        waiting = [each for each in waiting if self._is_known_by_limit(sign, each)]
         return max(waiting, key=lambda each: each.until, default=None)
 
 
@@ -455,7 +460,7 @@ def is_noise(one: Span, timeline: Timeline) -> bool:
                 longest = WORDS_WAIT if one.who in turn.to else longest
                 wait = max(wait, until[0])
     if one.known is None or (one.known[0] > wait and has_spoken_since(one, timeline)):
-        return one.seconds <= longest + 1e-6
+        return one.seconds <= longest + ROUND
     return False
 
 
@@ -478,6 +483,10 @@ def has_spoken_since(one: Span, timeline: Timeline) -> bool:
 
 def _speaks_to_robot(each: Span, person: str) -> bool:
     return each.who == person and each.action == "speak" and each.to == ROBOT
+
+
+def _words_come(speech: Span) -> float:
+    return inf if speech.known is None else speech.known[0]
 
 
 def _known(act: Span | Turn | Absence) -> Instant:
