@@ -193,9 +193,9 @@ class Listener:
                 self._tell(speech, at)  # the robot need not wait until it is over
             self.judge(at)
             return
-        listens = self._is_listening(speech)
-        is_new = speech.taken_for == "noise" and (in_turn or is_last)
-        if listens is False and (is_new or (in_turn and speech.taken_for == "backchannel")):
+        listens, taken = self._is_listening(speech), speech.taken_for
+        is_new = taken == "noise" and (in_turn or is_last)
+        if listens is False and (is_new or (in_turn and taken == "backchannel")):
             is_over = (self._scene.robot_speaks_since or inf) > speech.since  # the words into which it was said
             self._is_turn(speech, "answer" if is_over and not in_turn else "interruption", at)
         elif listens and (is_new or self._exchange.pair.was_listening(speech.since)):
@@ -203,7 +203,7 @@ class Listener:
                 self._joins(speech)
             else:
                 self._listens(ListenerSign([speech]), speech.until)
-        elif listens and in_turn and (speech.taken_for == "backchannel" or self._exchange.pair.is_interrupted):
+        elif listens and in_turn and (taken == "backchannel" or (taken and self._exchange.pair.is_interrupted)):
             self._tell(speech, at)  # it is that of the nod beside it, or more of the answer, which have been told
 
     # -- what it is ---------------------------------------------------------------------------------------------
