@@ -30,7 +30,7 @@ from msgspec import Struct, field
 
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.events.limits import ROUNDING
-from engage_hri.services.recognition.events.listener_sign import WORDS_WAIT, SignPart
+from engage_hri.services.recognition.events.listener_sign import SignPart
 from engage_hri.services.text.listening import greeting_before, without_honorific
 
 LONGEST_UNKNOWN: Seconds = 3.0
@@ -141,14 +141,6 @@ class OwnSpeech(Spoken, kw_only=True):
     """True once it has been told to the conversation."""
     is_beside: bool = False
     """True if it began while the robot said something to others."""
-
-    @property
-    def words_until(self) -> Seconds:
-        """Time until which its words count as known from the beginning, if it is into the robot's words."""
-        wait = self.since + WORDS_WAIT
-        if not self.is_beside:
-            return wait
-        return inf if self.until is None else max(wait, self.until + WORDS_AFTER)
 
 
 def named(words: str, names: Mapping[str, str]) -> Addressees:

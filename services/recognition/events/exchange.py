@@ -20,7 +20,7 @@ from collections.abc import Iterator, Sequence
 from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.adjacency_pair import AdjacencyPair
+from engage_hri.services.recognition.events.adjacency_pair import INTERRUPTED, RESPONDING, AdjacencyPair
 from engage_hri.services.recognition.events.listener_sign import SignPart
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent, SpeechStart
 from engage_hri.services.recognition.events.scene import SessionScene
@@ -69,7 +69,7 @@ class Exchange:
         pair = self.pair
         if pair.human_begins(action, at, confidence):
             pass
-        elif pair.is_being_answered:
+        elif pair.state in (INTERRUPTED, RESPONDING) or pair.late_answer is not None:
             return  # it is part of this exchange
         elif self._scene.answers_for_another(self._id, action, at, after=pair.asked_until):
             pair.forget_unanswered()

@@ -59,8 +59,6 @@ class Listener:
     def next_begins(self) -> None:
         """Decide the sign if it is over: its words have not come until the next one begins."""
         if self.sign is not None and self.sign.until is not None:
-            self.judge(self.sign.until)
-        if self.sign is not None and self.sign.until is not None:
             self._has_no_words(self.sign, self.sign.until)
 
     def _joins(self, part: SignPart, *, beside: bool = False) -> None:
@@ -169,18 +167,18 @@ class Listener:
             may_answer = not self.is_beside and self._exchange.pair.may_be_answered_with(part.action)
             if not self._is_echo(part) if is_speech else may_answer:
                 is_gesture_of_answer = reading == "answer" and not is_speech
-                if sign is not None and is_gesture_of_answer and self._awaits_words_before(sign, part, at):
+                if sign is not None and is_gesture_of_answer and self._awaits_words_before(sign, part):
                     sign.outlasting = part
                 else:
                     self._takes_floor(part, at, reading)
                 return
 
-    def _awaits_words_before(self, sign: ListenerSign, part: SignPart, at: Seconds) -> bool:
-        """True if words may come of the last speech of the sign, and it began before a part of it."""
+    def _awaits_words_before(self, sign: ListenerSign, part: SignPart) -> bool:
+        """True if words may still come of the last speech of the sign, and it began before a part of it."""
         if not self._scene.is_worded or sign.is_wordless or not sign.speeches:
             return False
         speech = sign.speeches[-1]
-        may_come = at < speech.since + WORDS_WAIT and not self._asks_for_nothing(speech)
+        may_come = self._writer.now < speech.since + WORDS_WAIT and not self._asks_for_nothing(speech)
         return may_come and speech.since < part.since
 
     def understand(self, speech: SignPart, at: Seconds, *, in_turn: bool, is_last: bool) -> None:

@@ -84,12 +84,6 @@ class OwnSpeeches:
             speech.may_be_noise = False
             self._scene.floor_changes += 1
 
-    def has_words_after_all(self, speech: OwnSpeech) -> None:
-        """Count a sound as said whose words have come late, beside a gesture that was told, if it is the last."""
-        if self._scene.is_last(self._id, speech.since):
-            speech.is_noise = False
-            self._scene.floor_changes += 1
-
     def is_certain(self, speech: OwnSpeech, at: Seconds) -> bool:
         """Decide to whom the speech is if that is certain."""
         speech.company |= self._scene.company(self._id)

@@ -66,14 +66,6 @@ class Worded(Struct, frozen=True, kw_only=True):
     """Addressees, if perception knows them."""
 
 
-class OpenTurn(NamedTuple):
-    """A turn of the robot that has not ended. to: addressees. asks: it is a first turn, with a pair for each."""
-
-    id: str
-    to: Addressees = frozenset()
-    asks: bool = False
-
-
 class Question(NamedTuple):
     """A question of the robot that waits. since: end of its turn. until: time by which an answer has to begin.
 
@@ -153,7 +145,8 @@ class SessionScene:
         self.gaze = GazeState()
         self.robot_spoken: Spoken | None = None
         """What the robot says now."""
-        self.turn: OpenTurn | None = None
+        self.turn: tuple[str, Addressees] | None = None
+        """The robot's turn that has not ended, and to whom it is."""
         self.head_owner = Claim(kind="none", priority=0)
         self.people_in_world: frozenset[str] = frozenset()
         self.covered = Covered(frozenset())

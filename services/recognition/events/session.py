@@ -30,7 +30,7 @@ from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING,
 from engage_hri.services.recognition.events.machine import Effect, EventWriter, Mishap, OngoingEvent
 from engage_hri.services.recognition.events.people import People
 from engage_hri.services.recognition.events.person import Part, PersonRecognition
-from engage_hri.services.recognition.events.scene import Covered, OpenTurn, SessionScene, Worded
+from engage_hri.services.recognition.events.scene import Covered, SessionScene, Worded
 from engage_hri.services.recognition.events.talk import Step
 from engage_hri.services.reports.ongoing_actions import GoesOn
 
@@ -228,7 +228,7 @@ class Session:
         for block, to in tuple(self._addressed.items()):
             self._addressed[block] = renamed_in(to, other, kept)
         if self.scene.turn is not None:
-            self.scene.turn = self.scene.turn._replace(to=renamed_in(self.scene.turn.to, other, kept))
+            self.scene.turn = self.scene.turn[0], renamed_in(self.scene.turn[1], other, kept)
         self._people.join(other, kept, at, speaks=speaks)
         self._lose_untold(other, at)
         return self._take()
@@ -294,7 +294,7 @@ class Session:
         block = behavior.rpartition(":")[0]
         if block in self._addressed:
             return self._addressed[block]
-        return None if self.scene.turn is None else self.scene.turn.to
+        return None if self.scene.turn is None else self.scene.turn[1]
 
     def announce(self, observation: Observation) -> None:
         """Learn to whom a block of the robot is. It may be called before the observation itself is fed."""
@@ -487,7 +487,7 @@ class Session:
         self._speaks_to(event.responder, event.block, event.started)
         ended = self._ended_turns.get(event.turn) if event.turn else self.blocks.ended.get(event.block)
         if ended is None:
-            self._opens(event.turn, event.responder, asks=True)
+            self._opens(event.turn, event.responder)
         return ended
 
     def _speaks_to(self, actor: str, block: str, at: Seconds) -> None:
@@ -499,15 +499,14 @@ class Session:
             self.scene.floor_changes += 1
             self._tell(actor, at, lambda talk: talk.robot_speaks(max(said.since, at), listens=False))
 
-    def _opens(self, turn: str, addressee: str, *, asks: bool) -> None:
+    def _opens(self, turn: str, addressee: str) -> None:
         """Note a turn of the robot that goes on over several blocks."""
         if turn and addressee:
-            before = self.scene.turn
-            before = OpenTurn(turn) if before is None or before.id != turn else before
-            self.scene.turn = OpenTurn(turn, before.to | {addressee}, asks or before.asks)
+            before = self.scene.turn[1] if self.scene.turn is not None and self.scene.turn[0] == turn else frozenset()
+            self.scene.turn = (turn, before | {addressee})
 
     def _closes(self, turn: str) -> None:
-        if self.scene.turn is not None and self.scene.turn.id == turn:
+        if self.scene.turn is not None and self.scene.turn[0] == turn:
             self.scene.turn = None
 
     def _cancel(self, cancel: Cancel, at: Seconds) -> None:
@@ -532,7 +531,7 @@ class Session:
             case "answered" | "repaired":
                 repairs = signal.signal == "repaired"
                 self.announce(request)
-                self._opens(signal.turn, signal.actor, asks=False)
+                self._opens(signal.turn, signal.actor)
                 self._speaks_to(signal.actor, request.block, at)
                 self._tell(signal.actor, at, lambda talk: talk.is_answered(at, repairs=repairs))
                 if request.block and request.block not in self.blocks.ended:

@@ -53,6 +53,8 @@ class Talk(KindRecognizer):
         """What is not told yet, with its times. The first is a speech of which it is not known to whom it is."""
         self._asked_in_line: Seconds = inf
         """Start of the first turn of the robot that is in line; infinite: none is."""
+        self._asked_in_turn = ""
+        """The last turn in which the robot has asked the person."""
         self.speeches = OwnSpeeches(id, scene, config, writer)
 
     @property
@@ -169,15 +171,12 @@ class Talk(KindRecognizer):
         is_into_words = said is not None and said.since <= at
         is_to_person = said is not None and said.is_to(self.id)
         speech.is_beside = is_into_words and not is_to_person
-        is_asked = self.asked_since < inf or self._conversation.exchange.pair.robot_holds_turn
-        turn = self._scene.turn
-        is_in_pause = is_asked and turn is not None and turn.asks and self.id in turn.to
+        is_in_pause = self._scene.turn is not None and self._scene.turn[0] == self._asked_in_turn
         may_be_in_turn = (is_into_words and is_to_person) or is_in_pause
-        is_into_turn = may_be_in_turn if self._line else self._conversation.is_into_turn(at)
         is_line = self._scene.lines.get(self.id) == at
         speech.may_be_noise = self._scene.is_worded and not (is_line or says_words(speech.words))
-        speech.is_into_turn = is_into_turn
-        speech.is_open = is_into_turn or speech.is_beside
+        speech.is_into_turn = may_be_in_turn if self._line else self._conversation.is_into_turn(at)
+        speech.is_open = speech.is_into_turn or speech.is_beside
         self.speeches.is_certain(speech, at)
         self.speeches.may_interrupt(speech, face, at)
         self._queue(at, speech)
@@ -232,20 +231,32 @@ class Talk(KindRecognizer):
         self.speeches.hear(speech, words, told, at)
         if not speech.is_heard or speech.is_noise:
             self._has_news(speech, at)
-        known, is_waited_for = speech.words, speech.company or self._conversation.listener.listens_to(speech.part)
-        if is_waited_for and at <= speech.words_until + ROUNDING:
-            self.take_early(since, lambda talk: self._judge(talk, speech, known, at))
-        else:
-            self.take(at, lambda talk: self._judge(talk, speech, known, at))
+        known, is_in_time = speech.words, self._is_in_time(speech, at)
+        self.take_early(since if is_in_time else at, lambda talk: self._judge(talk, speech, known, at))
         self.go_on(at)
+
+    def _is_in_time(self, speech: OwnSpeech, at: Seconds) -> bool:
+        """True if words into the robot's words, known at `at`, count as known when the speech began.
+
+        They have been waited for, in line or by the conversation; it does not wait in line for those of who is alone.
+        """
+        is_waited_for = bool(speech.company) or self._conversation.listener.listens_to(speech.part)
+        over = (at if speech.until is None else speech.until) + WORDS_AFTER if speech.is_beside else speech.since
+        return is_waited_for and at <= max(speech.since + WORDS_WAIT, over) + ROUNDING
 
     def _judge(self, talk: Dialogue, speech: OwnSpeech, words: str, at: Seconds) -> None:
         """Take the words of a speech in their turn; if they decide nothing they are told all the same."""
         speech.part.words = words or speech.part.words
         talk.understand(speech.part, at)
         self._writer.interject_again(self.id, speech.since, at)
-        if speech.is_noise and speech.is_heard and says_words(speech.words):
-            self.speeches.has_words_after_all(speech)
+        if (
+            speech.is_noise
+            and speech.is_heard
+            and says_words(speech.words)
+            and self._scene.is_last(self.id, speech.since)
+        ):
+            speech.is_noise = False  # its words come late, beside a gesture that was told
+            self._scene.floor_changes += 1
 
     def _has_news(self, speech: OwnSpeech, at: Seconds) -> None:
         """Take news of a speech of which nothing is told yet: it may be for others than it seemed, and no noise."""
@@ -291,7 +302,8 @@ class Talk(KindRecognizer):
         before = other._conversation.exchange.pair
         self._conversation.exchange.pair.take_over(before, self.id, other.id)
         for speech in other.speeches.in_order():
-            is_open = other._is_open(speech)
+            is_in_line = any(each is speech for _, each in other._line)
+            is_open = is_in_line or other._conversation.listener.listens_to(speech.part)
             speech.actor = self.id
             if speech.until is None and not goes_on:
                 speech.until = at
@@ -304,11 +316,6 @@ class Talk(KindRecognizer):
             if is_open:
                 self._begin_again(speech)
         self.go_on(at)
-
-    def _is_open(self, speech: OwnSpeech) -> bool:
-        """True if a speech is not decided."""
-        is_in_line = any(each is speech for _, each in self._line)
-        return is_in_line or self._conversation.listener.listens_to(speech.part)
 
     def _begin_again(self, speech: OwnSpeech) -> None:
         """Put a speech in line, in its place."""
@@ -344,9 +351,8 @@ class Talk(KindRecognizer):
         return next((n for n, (when, _) in enumerate(self._line) if when > at), len(self._line))
 
     def limit(self, wanted: Event) -> Seconds | None:
-        if not EVENT_KINDS[wanted.kind].is_answered:
-            return None
-        return self._config.manipulation_limit if "act" in wanted.accept else self._config.adjacency_pair_limit
+        longest = self._config.manipulation_limit if "act" in wanted.accept else self._config.adjacency_pair_limit
+        return longest if EVENT_KINDS[wanted.kind].is_answered else None
 
     def robot_asks(self, event: OngoingEvent, clock: LimitClock | None, ended: Seconds | None) -> None:
         """Take the robot's first turn, or the announcement of its backchannel."""
@@ -357,6 +363,7 @@ class Talk(KindRecognizer):
             self._scene.listening_blocks[event.block] = None
             self.take(at, lambda talk: talk.robot_announces(event, ended))
             return
+        self._asked_in_turn = event.turn
         self._take_in_order(at, lambda talk: talk.robot_asks(event))
         if self._line:
             self._asked_in_line = min(at, self._asked_in_line)
@@ -420,17 +427,15 @@ class Talk(KindRecognizer):
 
     @property
     def _undecided(self) -> list[OwnSpeech]:
-        speeches = [each for _, each in self._line if isinstance(each, OwnSpeech)]
-        return [each for each in speeches if not each.is_decided and (each.to is None or each.may_be_noise)]
+        return [
+            each for _, each in self._line
+            if isinstance(each, OwnSpeech) and not each.is_decided and (each.to is None or each.may_be_noise)
+        ]  # fmt: skip
 
     def _undecided_first(self) -> OwnSpeech | None:
         """The first in line, if it is a speech that is not decided; None: it is to be told next."""
         first = self._line[0][1]
         return first if isinstance(first, OwnSpeech) and not self._is_known(first) else None
-
-    def _may_be_noise(self, speech: OwnSpeech) -> bool:
-        """True if the first speech in line may be a cough. Of who is alone with it the conversation judges."""
-        return speech.may_be_noise and bool(speech.company or not self._is_into_words(speech))
 
     def _is_into_words(self, speech: OwnSpeech) -> bool:
         """True of what is for the robot, as far as is known, and into its words: the conversation says what it is."""
@@ -439,12 +444,19 @@ class Talk(KindRecognizer):
         return is_into_words and (may_be if speech.to is None else speech.is_to(self._scene.robot))
 
     def _is_known(self, speech: OwnSpeech) -> bool:
-        """True if it is known to whom the first speech in line is, and that it is one."""
-        return speech.is_decided or (speech.to is not None and not self._may_be_noise(speech))
+        """True if it is known to whom the first speech in line is, and that it is no cough.
+
+        Of who is alone with it the conversation judges, if it is into the robot's words.
+        """
+        may_be_noise = speech.may_be_noise and (speech.company or not self._is_into_words(speech))
+        return speech.is_decided or (speech.to is not None and not may_be_noise)
 
     def _queue(self, at: Seconds, speech: OwnSpeech) -> None:
-        is_next = speech.is_to(self._scene.robot) and self._waits_for_others(at)
-        if self._line or not self._is_known(speech) or is_next:
+        if (
+            self._line
+            or not self._is_known(speech)
+            or (speech.is_to(self._scene.robot) and self._waits_for_others(at))
+        ):
             self._line.append((at, speech))
         else:
             self._tell(speech)
