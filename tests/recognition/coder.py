@@ -213,7 +213,7 @@ class Coder:
             and turn.since < each.since < turn.until
         ]  # fmt: skip
         self._used |= {id(each) for each in signs}
-        if turn.is_aborted:
+        if turn.is_aborted and len(self._sides) == 1:  # of several people the cut waits in line for words
             signs = self._without_late(signs, turn)
         every, signs = signs, [each for each in signs if not self._goes_with_words(each, turn)]
         found: list[Span] = []

@@ -57,7 +57,7 @@ class Listener:
         self.judge(part.since)  # what is told late may have its words
 
     def next_begins(self) -> None:
-        """Decide the sign if it is over: its words have not come until the next one begins."""
+        """Decide the sign if it is over: its words have not come until the next one begins, or the robot's turn."""
         if self.sign is not None and self.sign.until is not None:
             self._has_no_words(self.sign, self.sign.until)
 
