@@ -108,6 +108,11 @@ class FaceTimes(Struct):
             self.looked[self.face] = self.looked.get(self.face, 0.0) + at - self.at
         self.face, self.at = face, max(at, self.at)
 
+    def rename(self, other: str, kept: str) -> None:
+        """Take the face of somebody for that of who they turn out to be."""
+        self.face = kept if self.face == other else self.face
+        self.looked[kept] = self.looked.pop(other, 0.0) + self.looked.get(kept, 0.0)
+
     def most(self, since: Seconds) -> str:
         """The face that was looked at for more than half of the time from `since` to `at`; "": none."""
         half = (self.at - since) / 2 + ROUNDING
@@ -115,9 +120,8 @@ class FaceTimes(Struct):
 
     def most_from(self, face: str, since: Seconds) -> Seconds:
         """Time from which on this face is the one, if the look stays; infinite: it is not looked at now."""
-        if self.face != face:
-            return inf
-        return 2 * (self.at - self.looked.get(face, 0.0) + 2 * ROUNDING) - since  # `most` says so by then
+        by = 2 * (self.at - self.looked.get(face, 0.0) + 2 * ROUNDING) - since  # `most` says so by then
+        return by if self.face == face else inf
 
 
 class OwnSpeech(Spoken, kw_only=True):

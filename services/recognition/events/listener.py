@@ -82,9 +82,8 @@ class Listener:
     def beside_since(self) -> Seconds | None:
         """Start of what the person says while the robot speaks to others, as long as it may be a turn."""
         sign = self.sign
-        if sign is None or not sign.is_beside or all(map(self._is_echo, sign.speeches)):
-            return None
-        return sign.since
+        is_none = sign is None or not sign.is_beside or all(map(self._is_echo, sign.speeches))
+        return None if sign is None or is_none else sign.since
 
     def ends(self, action: Action, at: Seconds) -> None:
         """End an action of the person."""
@@ -110,9 +109,8 @@ class Listener:
         sign = self.sign
         if sign is None or (sign.speeches and self._asks_for_nothing(sign.speeches[-1])):
             return inf
-        if sign.is_beside and self._scene.is_worded:
-            return sign.deadline(self._scene.longest_unknown, WORDS_AFTER)
-        return sign.deadline(self.longest)
+        waits = sign.is_beside and self._scene.is_worded
+        return sign.deadline(self._scene.longest_unknown, WORDS_AFTER) if waits else sign.deadline(self.longest)
 
     @property
     def waits_until(self) -> Seconds:

@@ -421,9 +421,9 @@ class Talk(KindRecognizer):
                 return True  # it is to be told first that this has answered for all
         if since is None or isinstance(first, CutOff):
             return since is not None and self._scene.is_contested(self.id, since)
-        if not isinstance(first, OwnSpeech) and not self._conversation.exchange.pair.may_be_answered:
-            return False  # it says nothing, and ends no question
-        return self._waits_for_others(since)
+        # Else it says nothing, and ends no question.
+        may_matter = isinstance(first, OwnSpeech) or self._conversation.exchange.pair.may_be_answered
+        return may_matter and self._waits_for_others(since)
 
     @property
     def _undecided(self) -> list[OwnSpeech]:
