@@ -8,8 +8,7 @@ from math import inf
 
 from msgspec.structs import replace
 
-from tests.recognition.coder import BRIEF, FACE_GRACE, ROUND, WORDS_WAIT
-from tests.recognition.floor_coder import is_noise, longest_sound
+from tests.recognition.coder import BRIEF, FACE_GRACE, ROUND, WORDS_WAIT, is_noise, longest_sound
 from tests.recognition.observations import ROBOT
 from tests.recognition.timeline import CALLED, LIMIT, Span, Timeline
 
@@ -33,29 +32,33 @@ def addressee(speech: Span, before: Timeline) -> str:
     """For whom a speech is; "": nobody knows. before: with looks, turns of the robot, all that was said before."""
     if before.is_first and speech.known is not None and speech.until < speech.known and not _spoken(before):
         found = _looked_at(speech, before) or _answered(speech, before)  # nobody knows that words will come
-        people = (ROBOT, *(each for each in before.people if each != speech.who))
-        return found if found == ROBOT else called_by(speech.words, people, before.unseen) or found
+        return found if found == ROBOT else _called(speech, before) or found
     is_decided = speech.known is not None and _held_at(speech, before) <= speech.known[0]
     if speech.told and (before.tells == "early" or not is_decided):
         return speech.told
-    if not is_decided and (called := called_by(speech.words, _known_by_name(speech, before), before.unseen)):
+    if not is_decided and (called := _called(speech, before)):
         return called
     if speech.is_line or not _company(speech, before):
         return ROBOT
     return _looked_at(speech, before) or _answered(speech, before)
 
 
-def _known_by_name(speech: Span, before: Timeline) -> tuple[str, ...]:
-    """Whom words can call: not who says them, nor who is known by another id alone when they come."""
+def _called(speech: Span, before: Timeline) -> str:
+    """Whom the words of a speech call: nobody who is known by another id alone when they come.
+
+    Who is known by the own id, too, and speaks by another calls somebody else, as far as anybody knows.
+    """
     at = speech.known or speech.since
     unknown = {each.who for each in before.joins if at < each.at and not (each.is_known or each.changes)}
-    return (ROBOT, *(each for each in before.people if each not in unknown | {speech.who}))
+    is_another = any(each.who == speech.who and at < each.at and each.is_known for each in before.joins)
+    people = (ROBOT, *(each for each in before.people if each not in unknown))
+    return called_by(speech.words, people, before.unseen, "" if is_another else speech.who)
 
 
-def called_by(words: str, people: tuple[str, ...], unseen: Collection[str] = ()) -> str:
+def called_by(words: str, people: tuple[str, ...], unseen: Collection[str] = (), speaker: str = "") -> str:
     """Who is called: first, last after a comma, or last of a few words. A comma parts words where no blank does.
 
-    unseen: people of whom only the ids are known.
+    unseen: people of whom only the ids are known. speaker: whose own name calls nobody, nor do parts of it.
     """
     said = [each for each in words.replace("、", ", ").replace("。", ". ").split() if any(map(str.isalnum, each))]
     plain = [each.strip(",.!?").casefold() for each in said]
@@ -65,11 +68,12 @@ def called_by(words: str, people: tuple[str, ...], unseen: Collection[str] = ())
     names = [(name.casefold().split(), who) for who in people for name in (who, CALLED.get(who, ""))
              if name == who or (name and who not in unseen)]  # fmt: skip
     for parts, who in sorted(names, key=lambda each: -len(each[0])):
-        if plain[: len(parts)] == parts:
-            return who
         rest = said[: -len(parts)]
-        if plain[-len(parts) :] == parts and (len(rest) < SHORT or rest[-1].endswith(",")):
-            return who
+        is_last = plain[-len(parts) :] == parts and (len(rest) < SHORT or rest[-1].endswith(","))
+        if plain[: len(parts)] == parts or is_last:
+            if who != speaker:
+                return who
+            plain = ["" if word in parts else word for word in plain]
     return ""
 
 
@@ -114,6 +118,29 @@ def _looked_at(speech: Span, before: Timeline) -> str:
     return next((face for face, common in seconds.items() if common > HALF * speech.seconds + ROUND), "")
 
 
+def _is_awaited(speech: Span, before: Timeline) -> bool:
+    """True if the robot has asked the speaker, and nobody has answered yet."""
+    at = speech.since
+    asked = [turn for turn in before.turns if turn.kind == "asks" and speech.who in turn.to and turn.until < at]
+    if not asked or asked[-1].is_aborted or at[0] > asked[-1].until[0] + LIMIT + ROUND:
+        return False
+    since = [
+        each for each in before.spans
+        if each.to == ROBOT and asked[-1].since < each.since and each.since[0] < at[0] and each.action != "look"
+    ]  # fmt: skip
+    return not any(
+        not is_noise(each, before) if each.action == "speak" else not _is_beside_words(each, before) for each in since
+    )
+
+
+def _is_beside_words(sign: Span, before: Timeline) -> bool:
+    """True if somebody speaks when a gesture of theirs begins."""
+    return any(
+        each.who == sign.who and each.action == "speak" and each.since < sign.since < each.until
+        for each in before.spans
+    )  # fmt: skip
+
+
 def _answered(speech: Span, before: Timeline) -> str:
     """Who has spoken to the speaker last, or to whom the speaker has; "": neither, as long as an answer may take."""
     at, decided = speech.since[0], max(speech.until, speech.known or speech.until)
@@ -123,15 +150,15 @@ def _answered(speech: Span, before: Timeline) -> str:
             heard += [(until[0], since[0], ROBOT, "") for since, until in turn.speech]
     for each in before.spans:
         if each.action == "speak" and not is_noise(each, before) and speech.who in (each.who, each.to):
-            known = min(each.until, (each.since[0] + longest_sound(before), 0))
-            if each.who != speech.who and known > decided and before.tells != "early":
-                continue  # nobody knows yet to whom it is
+            known = min(max(each.until, each.known or each.until), (each.since[0] + longest_sound(before), 0))
+            if each.who != speech.who and known > decided:
+                continue  # nobody knows yet to whom it is, or that it is no cough
             heard.append((each.until[0], each.since[0], each.who, each.to))
     recent = [
         (min(until, at), since, who, to) for until, since, who, to in heard if since < at <= until + LIMIT + ROUND
     ]
     if not recent:
-        return ""
+        return ROBOT if _is_awaited(speech, before) else ""
     _, _, who, to = max(recent)
     if who != speech.who:
         return who

@@ -6,6 +6,7 @@ docs/recognition.md.
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
+from math import inf
 from typing import Any
 
 from msgspec import Struct
@@ -72,6 +73,8 @@ class Coder:
         """Signs that have been read within a turn of the robot, by `id`."""
         self._turns: set[int] = set()
         """Those that turned out to be turns of the person, to be read when they come."""
+        self._late: list[Span] = []
+        """Those that are known to be turns only when their words come, for which nobody has waited."""
         self._gone = [each for each in timeline.away if each.until[0] - each.since[0] >= FACE_GRACE]
 
     def events(self) -> list[Coded]:
@@ -79,8 +82,6 @@ class Coder:
         signs = [each for each in self._timeline.spans if each.to == ROBOT and each.action != "look"]
         acts: list[Span | Turn | Absence] = [*signs, *self._timeline.turns, *self._gone]
         for act in self._in_order(acts):
-            for side in self._sides.values():
-                self._expire(side, _known(act)[0])
             if isinstance(act, Turn):
                 self._robot_speaks(act)
                 for side in self._sides.values():
@@ -101,8 +102,21 @@ class Coder:
 
         Unless it is known at once what each says, and to whom: into the robot's words, where perception tells it.
         """
-        for _, together in groupby(sorted(acts, key=_known), key=lambda act: _known(act)[0]):
+        for at, together in groupby(sorted(acts, key=_known), key=lambda act: _known(act)[0]):
+            yield from self._late_words(at)
+            for side in self._sides.values():
+                self._expire(side, at)
             yield from sorted(together, key=self._is_of_another)
+        yield from self._late_words(inf)
+
+    def _late_words(self, until: float) -> Iterator[Span]:
+        """Speeches of which nothing was told before their words, which come until then: what waits may be theirs."""
+        while self._late and (first := min(self._late, key=_words_come)) and _words_come(first) <= until:
+            self._late.remove(first)
+            self._turns.add(id(first))
+            for side in self._sides.values():
+                self._expire(side, _words_come(first))
+            yield first
 
     def _is_of_another(self, act: Span | Turn | Absence) -> tuple[bool, bool]:
         speech = [each for turn in self._timeline.turns for each in turn.speech]
@@ -199,7 +213,7 @@ class Coder:
             and turn.since < each.since < turn.until
         ]  # fmt: skip
         self._used |= {id(each) for each in signs}
-        if turn.is_aborted:
+        if turn.is_aborted and len(self._sides) == 1:  # of several people the cut waits in line for words
             signs = self._without_late(signs, turn)
         every, signs = signs, [each for each in signs if not self._goes_with_words(each, turn)]
         found: list[Span] = []
@@ -211,12 +225,14 @@ class Coder:
             ]  # fmt: skip
             following = sets[number + 1][0].since if number + 1 < len(sets) else (1e9, 0)
             over = max(each.until for each in every if sign[0].since <= each.since <= sign[-1].until)
-            late = [each for each in sign if self._is_told_late(each, following)]
+            late = [each for each in sign if self._is_told_late(each, following, over)]
             is_brief = any(over < each.known for each in late if each.known is not None) and not goes_on
             parts = [each for each in sign if each not in late and self._shows(each)]
-            interrupts = [
-                each for each in sign
-                if each.action == "speak" and self._interrupts(each, turn, is_noise=not parts)
+            interrupts = [each for each in sign if each.action == "speak" and self._interrupts(each, turn)]
+            self._late += [
+                each for each in late
+                if not parts and each not in interrupts and not self._is_known_in(each, turn)
+                and each.words not in LISTENING and self._is_last(each)
             ]  # fmt: skip
             answers = sorted([*goes_on, *interrupts], key=lambda each: each.since)
             if any(each.action == "speak" for each in answers) or (answers and not found):
@@ -254,9 +270,12 @@ class Coder:
                 is_noise = self._timeline.is_worded and not is_known
                 shown = sorted(each.since for each in sign if self._shows(each))
                 shown = shown if is_noise else [speech.since]
-                is_brief = speech.seconds <= (self._longest_sound if self._timeline.is_worded else BRIEF) + ROUND
+                longest = longest_sound(self._timeline) if self._timeline.is_worded else BRIEF
+                is_brief = speech.seconds <= longest + ROUND
                 takes_floor = speech.is_line or (speech.words not in LISTENING if is_known else not is_brief)
-                if speech.until > until or takes_floor:
+                if speech.until <= until and takes_floor and is_known and not is_in_time:
+                    self._late.append(speech)
+                elif speech.until > until or takes_floor:
                     self._turns.add(id(speech))
                 elif shown:
                     self._note("backchannel", ROBOT, side.person, shown[0][0], "completed")
@@ -270,14 +289,7 @@ class Coder:
 
     def _is_last(self, speech: Span) -> bool:
         """True if words come of a speech, and neither the person nor the robot to them has spoken before they do."""
-        if speech.known is None:
-            return False
-        own = [
-            each.since for each in self._timeline.spans
-            if _speaks_to_robot(each, speech.who) and speech.since < each.since and not self._is_noise(each)
-        ]  # fmt: skip
-        robots = [since for turn in self._timeline.turns if speech.who in turn.to for since, _ in turn.speech]
-        return not any(speech.since < since < speech.known for since in (*own, *robots))
+        return speech.known is not None and not has_spoken_since(speech, self._timeline)
 
     def _is_listening(self, side: Side, turn: Turn) -> bool:
         """True if the robot says a little while the person speaks, and has nothing to answer."""
@@ -303,11 +315,16 @@ class Coder:
         is_noise = sign.action == "speak" and self._timeline.is_worded and sign.known is None
         return sign.action != "point" and not is_noise
 
-    def _is_told_late(self, speech: Span, following: Instant) -> bool:
-        """True if a sound has been told as noise when its words come. following: when the next sign begins."""
+    def _is_told_late(self, speech: Span, following: Instant, over: Instant = BEFORE) -> bool:
+        """True if a sound has been told as noise when its words come.
+
+        following: when the next sign begins. over: when the sign is over, of which it is part, and told.
+        """
         if speech.known is None or speech.seconds > WORDS_WAIT + ROUND:
             return False
-        return following < speech.known or speech.known[0] > speech.since[0] + WORDS_WAIT + ROUND
+        # Of several people each next sign waits in line until the words of the one before have come.
+        is_next = len(self._sides) == 1 and following < speech.known
+        return is_next or speech.known[0] > max(speech.since[0] + WORDS_WAIT, over[0]) + ROUND
 
     def _goes_with_words(self, sign: Span, turn: Turn) -> bool:
         """True for a gesture beside the person's own words, if these are no listener's: it says nothing more."""
@@ -346,16 +363,12 @@ class Coder:
         is_told_late = len(self._sides) > 1 and self._is_heard(answer) and answer.words not in LISTENING
         return answer.action == "speak" and (decided < turn.until[0] - ROUND or is_told_late)
 
-    def _interrupts(self, speech: Span, turn: Turn, *, is_noise: bool = False) -> bool:
-        """True if a speech that is over within the robot's turn takes the floor.
-
-        is_noise: nothing is told of the sign unless words come, so that these may come after the turn.
-        """
+    def _interrupts(self, speech: Span, turn: Turn) -> bool:
+        """True if a speech that is over within the robot's turn takes the floor, as far as is known in time."""
         if speech.is_line:
             return True
         is_open = turn.kind == "asks" or speech.seconds <= WORDS_WAIT + ROUND
-        is_noise &= speech.seconds <= WORDS_WAIT + ROUND
-        if is_open and (self._is_known_in(speech, turn) or (is_noise and self._is_last(speech))):
+        if is_open and self._is_known_in(speech, turn):
             return speech.words not in LISTENING
         return speech.seconds > (WORDS_WAIT if self._timeline.is_worded else BRIEF) + ROUND
 
@@ -376,16 +389,12 @@ class Coder:
         if sign.since >= side.answers_until and not goes_with_words and not self._is_noise(sign):
             self._takes_turn(side, sign)
 
-    @property
-    def _longest_sound(self) -> float:
-        return LONGEST_SOUND_TOLD if self._timeline.tells else LONGEST_SOUND
-
     def _is_noise(self, sign: Span) -> bool:
         """True for a cough, or a laugh: no words come where they would have come, or too late to say anything."""
         is_late = sign.known is not None and sign.known[0] > sign.until[0] + WORDS_AFTER + ROUND
         is_unheard = sign.known is None or (is_late and not self._is_last(sign))
         is_wordless = is_unheard and self._timeline.is_worded and id(sign) not in self._used
-        return sign.action == "speak" and is_wordless and sign.seconds <= self._longest_sound + ROUND
+        return sign.action == "speak" and is_wordless and sign.seconds <= longest_sound(self._timeline) + ROUND
 
     def _takes_turn(self, side: Side, sign: Span) -> None:
         """Read an answer, or words of the person's own."""
@@ -435,13 +444,49 @@ class Coder:
         last = (side.own[-1].until if side.own else BEFORE)[0]
         at = sign.since[0]
         waiting = [each for each in asked if last < each.until[0] < at]
-        if sign.known is not None and sign.known[0] > sign.until[0] + WORDS_AFTER:  # nobody waited for these words
-            waiting = [each for each in waiting if sign.known[0] <= each.until[0] + self._limit]
         return max(waiting, key=lambda each: each.until, default=None)
+
+
+def is_noise(one: Span, timeline: Timeline) -> bool:
+    """True for a sound of which no words come where they would have come, or too late to say anything."""
+    if not timeline.is_worded:
+        return False
+    longest, wait = longest_sound(timeline), one.until[0] + WORDS_AFTER
+    for turn in timeline.turns:
+        for since, until in [(turn.since, turn.until)] if one.who in turn.to else turn.speech:
+            if one.to == ROBOT and since < one.since < until:
+                if until < one.until:
+                    return False
+                longest = WORDS_WAIT if one.who in turn.to else longest
+                wait = max(wait, until[0])
+    if one.known is None or (one.known[0] > wait and has_spoken_since(one, timeline)):
+        return one.seconds <= longest + ROUND
+    return False
+
+
+def longest_sound(timeline: Timeline) -> float:
+    """Longest sound without words that may be none."""
+    return LONGEST_SOUND_TOLD if timeline.tells else LONGEST_SOUND
+
+
+def has_spoken_since(one: Span, timeline: Timeline) -> bool:
+    """True if the person or the robot has begun to say something to the other before the words are known."""
+    assert one.known is not None
+    own = [
+        each.since for each in timeline.spans
+        if each.who == one.who and each.action == "speak" and each.to == ROBOT and one.since < each.since < one.known
+        and not is_noise(each, timeline)
+    ]  # fmt: skip
+    robots = [since for turn in timeline.turns if one.who in turn.to for since, _ in turn.speech]
+    return any(one.since < since < one.known for since in (*own, *robots))
 
 
 def _speaks_to_robot(each: Span, person: str) -> bool:
     return each.who == person and each.action == "speak" and each.to == ROBOT
+
+
+def _words_come(speech: Span) -> float:
+    return inf if speech.known is None else speech.known[0]
 
 
 def _known(act: Span | Turn | Absence) -> Instant:

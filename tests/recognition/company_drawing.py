@@ -152,9 +152,9 @@ class JoinDrawing(CompanyDrawing):
         away = {each.who for each in self.timeline.away}
         people = [each for each in self.timeline.people if each not in away and each not in CALLED]
         for number, who in enumerate(self._chance.sample(people, min(len(people), self._chance.choice((1, 1, 2))))):
-            self._draw_join(who, f"face_{number}")
+            self._draw_join(who, number)
 
-    def _draw_join(self, who: str, id: str) -> None:
+    def _draw_join(self, who: str, number: int) -> None:
         """Draw when it becomes known: at any time, or in the very instant in which somebody begins or ends."""
         chance = self._chance
         instants = [at for each in self.timeline.spans for at in (each.since, each.until)]
@@ -163,6 +163,7 @@ class JoinDrawing(CompanyDrawing):
             (self._at(self._between(1.0, self._end)), (chance.choice(instants)[0], chance.choice((-2, 10**7))))
         )
         kind = chance.choice(("named", "changed", "known"))
+        id = f"face_{number}"
         join = Join(who, id, at, is_known=kind == "known" and not self.timeline.away, goes_on=chance.random() < 0.5)
         if kind == "changed":
             join.changes, join.goes_on = (at[0], -3), True
@@ -173,4 +174,14 @@ class JoinDrawing(CompanyDrawing):
                 if each.who == who
             ):
                 return
+        else:
+            self._order_by_id(who, len(NAMES) + number)
         self.timeline.joins.append(join)
+
+    def _order_by_id(self, who: str, number: int) -> None:
+        """Observe somebody in the order of the id by which recognition knows them: it decides between two at once."""
+        for each in self.timeline.spans:
+            if each.who == who and each.action == "speak":
+                each.since = each.since[0], number
+                if each.is_alone and each.known is not None:
+                    each.until, each.known = (each.until[0], number), (each.known[0], number + 1)

@@ -85,7 +85,10 @@ class Drawing:
         ends = self._at(
             min(begins[0] + self._between(0.2, 0.8), until + 0.05 if len(self.timeline.people) > 1 else 1e9)
         )
-        if ends[0] - begins[0] >= 0.1:
+        is_again = any(
+            each.who == person and each.action == action and begins < each.until for each in self.timeline.spans
+        )
+        if ends[0] - begins[0] >= 0.1 and not is_again:  # nobody nods twice at a time
             self.timeline.spans.append(Span(person, action, begins, ends))
 
     def _draw_robot(self) -> None:

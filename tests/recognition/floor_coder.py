@@ -8,9 +8,9 @@ from itertools import pairwise
 from math import inf
 
 from engage_hri.schemas.recognition import Floor, FloorSpeech
-from tests.recognition.coder import LONGEST_SOUND, LONGEST_SOUND_TOLD, WORDS_AFTER, WORDS_WAIT
+from tests.recognition.coder import is_noise
 from tests.recognition.observations import ROBOT
-from tests.recognition.timeline import SAID_BEFORE, STRANGER, Span, Timeline
+from tests.recognition.timeline import SAID_BEFORE, STRANGER, Timeline
 
 LAST = 4
 """Speeches that are told when they are over."""
@@ -65,40 +65,6 @@ def ended(timeline: Timeline) -> Iterator[Said]:
     for one in timeline.spans:
         if one.action == "speak" and one.to and not is_noise(one, timeline):
             yield one.who, round(one.since[0], 5), round(one.until[0], 5), (one.to,)
-
-
-def is_noise(one: Span, timeline: Timeline) -> bool:
-    """True for a sound of which no words come where they would have come, or too late to say anything."""
-    if not timeline.is_worded:
-        return False
-    longest, wait = longest_sound(timeline), one.until[0] + WORDS_AFTER
-    for turn in timeline.turns:
-        for since, until in [(turn.since, turn.until)] if one.who in turn.to else turn.speech:
-            if one.to == ROBOT and since < one.since < until:
-                if until < one.until:
-                    return False
-                longest = WORDS_WAIT if one.who in turn.to else longest
-                wait = max(wait, until[0])
-    if one.known is None or (one.known[0] > wait and has_spoken_since(one, timeline)):
-        return one.seconds <= longest + 1e-6
-    return False
-
-
-def longest_sound(timeline: Timeline) -> float:
-    """Longest sound without words that may be none."""
-    return LONGEST_SOUND_TOLD if timeline.tells else LONGEST_SOUND
-
-
-def has_spoken_since(one: Span, timeline: Timeline) -> bool:
-    """True if the person or the robot has begun to say something to the other before the words are known."""
-    assert one.known is not None
-    own = [
-        each.since for each in timeline.spans
-        if each.who == one.who and each.action == "speak" and each.to == ROBOT and one.since < each.since < one.known
-        and not is_noise(each, timeline)
-    ]  # fmt: skip
-    robots = [since for turn in timeline.turns if one.who in turn.to for since, _ in turn.speech]
-    return any(one.since < since < one.known for since in (*own, *robots))
 
 
 def _speaking(timeline: Timeline, floors: list[Floor]) -> Iterator[str]:

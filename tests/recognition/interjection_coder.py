@@ -10,8 +10,7 @@ from itertools import pairwise
 from msgspec import Struct
 
 from engage_hri.schemas.recognition import Interjection
-from tests.recognition.coder import BRIEF, ROUND, WORDS_AFTER, WORDS_WAIT
-from tests.recognition.floor_coder import has_spoken_since, longest_sound
+from tests.recognition.coder import BRIEF, ROUND, WORDS_AFTER, WORDS_WAIT, has_spoken_since, longest_sound
 from tests.recognition.observations import ROBOT
 from tests.recognition.timeline import LISTENING, Instant, Span, Timeline, Turn
 
@@ -58,8 +57,10 @@ def judged(timeline: Timeline, told: list[Interjection]) -> Iterator[str]:
         life = lives.get(key, [])
         coded = _reading(one, timeline)
         last = life[-1].reading if life else ""
-        if one.is_beside and (coded == {"noise"} or timeline.tells == "late"):
-            coded = {*coded, ""}  # to whom it is may never be known, or when the robot is silent
+        if one.is_beside and timeline.tells == "late":
+            coded = {*coded, ""}  # to whom it is may be known when the robot is silent
+        elif coded == {"noise"} and (one.is_beside or _looks_at_neighbor(one.speech, timeline)):
+            coded = {*coded, ""}  # to whom it is may never be known
         if last not in coded:
             yield f"{key[0]} at {key[1]}{' beside' * one.is_beside}: told {last!r}, coded {sorted(coded)}"
         elif (
@@ -117,7 +118,8 @@ def _reading(one: Into, timeline: Timeline) -> set[str]:
         if each.who == speech.who and each.action in ("nod", "shake", "point")
         and each.since < speech.until and speech.since < each.until
     ]  # fmt: skip
-    is_of_answer = turn.kind == "asks" and any(turn.until < each.until for each in beside)
+    is_long = speech.seconds > WORDS_WAIT + ROUND and wait < over  # it has been one that interrupts before
+    is_of_answer = not is_long and turn.kind == "asks" and any(turn.until < each.until for each in beside)
     if is_of_answer and not one.is_beside and not outlasts:
         return {"answer", by_words if known is not None and known[0] <= wait else "noise"}
     if known is not None and (not outlasts or known < one.until):

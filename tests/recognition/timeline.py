@@ -186,7 +186,11 @@ def _of_join(log: HeardLog, join: Join) -> Iterator[tuple[Instant, int, Callable
 def _room(*people: str) -> World:
     """The world with these people and their names."""
     seen = world(*people)
-    entities = (replace(each, name=CALLED.get(each.id, "")) for each in seen.entities)
+    entities = (
+        replace(each, name=CALLED.get(each.id, ""))
+        for each in seen.entities
+        if each.kind != "person" or each.id in people
+    )
     return replace(seen, entities=tuple(entities))
 
 

@@ -76,6 +76,11 @@ class Spoken(Struct, kw_only=True):
     """Time from which on it counts for what others say; infinite: it does not yet."""
 
     @property
+    def is_speech(self) -> bool:
+        """True if it is known to be no cough."""
+        return not (self.is_noise or self.may_be_noise)
+
+    @property
     def named(self) -> Addressees:
         """Ids of the addressees, as far as they are known."""
         return NOBODY if self.to is None or self.to is WHOEVER else self.to
@@ -103,6 +108,11 @@ class FaceTimes(Struct):
             self.looked[self.face] = self.looked.get(self.face, 0.0) + at - self.at
         self.face, self.at = face, max(at, self.at)
 
+    def rename(self, other: str, kept: str) -> None:
+        """Take the face of somebody for that of who they turn out to be."""
+        self.face = kept if self.face == other else self.face
+        self.looked[kept] = self.looked.pop(other, 0.0) + self.looked.get(kept, 0.0)
+
     def most(self, since: Seconds) -> str:
         """The face that was looked at for more than half of the time from `since` to `at`; "": none."""
         half = (self.at - since) / 2 + ROUNDING
@@ -110,9 +120,8 @@ class FaceTimes(Struct):
 
     def most_from(self, face: str, since: Seconds) -> Seconds:
         """Time from which on this face is the one, if the look stays; infinite: it is not looked at now."""
-        if self.face != face:
-            return inf
-        return 2 * (self.at - self.looked.get(face, 0.0) + 2 * ROUNDING) - since  # `most` says so by then
+        by = 2 * (self.at - self.looked.get(face, 0.0) + 2 * ROUNDING) - since  # `most` says so by then
+        return by if self.face == face else inf
 
 
 class OwnSpeech(Spoken, kw_only=True):
@@ -126,6 +135,8 @@ class OwnSpeech(Spoken, kw_only=True):
     told: Addressees | None = None
     """Addressees by perception."""
     words: str = ""
+    worded_at: Seconds = -inf
+    """Time when its first words became known."""
     is_into_turn: bool = False
     """True if it began while the robot had the floor, as far as is known."""
     is_decided: bool = False
@@ -202,7 +213,7 @@ def likely(
     # Those that it comes during, or at most `within` after: few of all.
     recent = [each for each in spoken if each.since < at and (each.until is None or at <= each.until + within)]
     known = [each for each in recent if each.noted_at <= by]
-    heard = [each for each in known if (each.actor == actor or each.is_to(actor)) and not each.is_noise]
+    heard = [each for each in known if (each.actor == actor or each.is_to(actor)) and each.is_speech]
     # Who still goes on is the last, however that may end.
     last = max(heard, key=lambda each: (at if each.until is None else min(each.until, at), each.since), default=None)
     if last is None:

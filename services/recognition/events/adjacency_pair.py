@@ -83,6 +83,8 @@ class AdjacencyPair(Machine):
         self._third_turn_until: Seconds = 0.0
         self._unanswered: OngoingEvent | None = None
         """The robot's last pair, if its limit passed without an answer and nobody has begun a turn since."""
+        self.late_answer: Action | None = None
+        """What the person answers with, late, as long as that goes on."""
         self._forgotten_at: Seconds = NEVER
         """When the robot has first said something after that limit; until then, when it has last done so."""
         self.interrupted_until: Seconds = NEVER
@@ -101,9 +103,8 @@ class AdjacencyPair(Machine):
     @property
     def interrupted_since(self) -> Seconds:
         """Start of the answer to the robot's first turn, which goes on; infinite: there is none."""
-        if self.event is None or self.state != INTERRUPTED or not self._by_robot:
-            return inf
-        return self.event.response_since
+        is_by_robot = self.state == INTERRUPTED and self._by_robot
+        return self.event.response_since if self.event is not None and is_by_robot else inf
 
     @property
     def deadline(self) -> Seconds:
@@ -301,6 +302,7 @@ class AdjacencyPair(Machine):
         if event is None or self._turn_end is None or action not in event.accept or at > self._forgotten_at:
             return False
         self.forget_unanswered()
+        self.late_answer = action
         event.rests_on(confidence)
         event.response, event.delay = action, at - self._turn_end
         event.spoken = _spoken(event.responder, action, at)
@@ -321,18 +323,14 @@ class AdjacencyPair(Machine):
 
     def _is_earlier_answer(self, action: Action, at: Seconds) -> bool:
         """True if the action, known only now, began before the one that has been taken for the answer so far."""
-        if self.event is None or self.state != INTERRUPTED or not self._by_robot:
-            return False
-        return at < self.event.response_since and action in self.event.accept
+        return at < self.interrupted_since < inf and self.event is not None and action in self.event.accept
 
     def was_listening(self, since: Seconds) -> bool:
         """Wait on: the words of this speech, taken for the answer during the robot's turn, are a listener's.
 
         False if it has not been taken for the answer.
         """
-        if self.event is None or self.state != INTERRUPTED or not self._by_robot:
-            return False
-        if (self.event.response, self.event.response_since) != ("speak", since):
+        if self.event is None or self.interrupted_since != since or self.event.response != "speak":
             return False
         self.event.response, self.event.spoken = None, ()
         self.step("was_listening", since)
@@ -367,6 +365,7 @@ class AdjacencyPair(Machine):
 
     def ends(self, action: Action, at: Seconds, *, by_robot: bool) -> None:
         """End an action of person or robot: it may be the person's first turn, or the response."""
+        self.late_answer = None if not by_robot and action == self.late_answer else self.late_answer
         if self.event is None:
             return
         if by_robot == self._by_robot:

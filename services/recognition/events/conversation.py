@@ -202,6 +202,7 @@ class Dialogue:
         self.exchange.ends(action, at, by_robot=True)
 
     def robot_asks(self, event: OngoingEvent) -> None:
+        self.listener.next_begins()
         self._drop_robots_sign(event.started)
         self.exchange.robot_asks(event)
         if self.robot_speaks_since is not None:

@@ -69,7 +69,7 @@ class Exchange:
         pair = self.pair
         if pair.human_begins(action, at, confidence):
             pass
-        elif pair.state in (INTERRUPTED, RESPONDING):
+        elif pair.state in (INTERRUPTED, RESPONDING) or pair.late_answer is not None:
             return  # it is part of this exchange
         elif self._scene.answers_for_another(self._id, action, at, after=pair.asked_until):
             pair.forget_unanswered()

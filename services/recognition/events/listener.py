@@ -57,9 +57,7 @@ class Listener:
         self.judge(part.since)  # what is told late may have its words
 
     def next_begins(self) -> None:
-        """Decide the sign if it is over: its words have not come until the next one begins."""
-        if self.sign is not None and self.sign.until is not None:
-            self.judge(self.sign.until)
+        """Decide the sign if it is over: its words have not come until the next one begins, or the robot's turn."""
         if self.sign is not None and self.sign.until is not None:
             self._has_no_words(self.sign, self.sign.until)
 
@@ -84,9 +82,8 @@ class Listener:
     def beside_since(self) -> Seconds | None:
         """Start of what the person says while the robot speaks to others, as long as it may be a turn."""
         sign = self.sign
-        if sign is None or not sign.is_beside or all(map(self._is_echo, sign.speeches)):
-            return None
-        return sign.since
+        is_none = sign is None or not sign.is_beside or all(map(self._is_echo, sign.speeches))
+        return None if sign is None or is_none else sign.since
 
     def ends(self, action: Action, at: Seconds) -> None:
         """End an action of the person."""
@@ -112,9 +109,13 @@ class Listener:
         sign = self.sign
         if sign is None or (sign.speeches and self._asks_for_nothing(sign.speeches[-1])):
             return inf
-        if sign.is_beside and self._scene.is_worded:
-            return sign.deadline(self._scene.longest_unknown, WORDS_AFTER)
-        return sign.deadline(self.longest)
+        waits = sign.is_beside and self._scene.is_worded
+        return sign.deadline(self._scene.longest_unknown, WORDS_AFTER) if waits else sign.deadline(self.longest)
+
+    @property
+    def waits_until(self) -> Seconds:
+        """Time until which a sign that is over waits for its words, whatever has come since; infinite: none does."""
+        return inf if self.sign is None or self.sign.until is None else self.deadline
 
     @property
     def longest(self) -> Seconds:
@@ -154,26 +155,28 @@ class Listener:
     def robots_turn_ends(self, at: Seconds, reading: InterjectionReading = "answer") -> None:
         """Take what goes on of the sign for the answer, because the robot's turn is over.
 
-        Of several parts it is the one that began first. A gesture that answers nothing here stays what it is, and one
-        beside a speech whose words may come waits for them: that began before.
+        Of several parts it is the one that began first. A gesture that answers nothing here stays what it is, as
+        beside the robot's words to others, and one beside a speech whose words may come waits for them: that began
+        before.
         """
         sign = self.sign
         for part in sign.going_on() if sign is not None else ():
             is_speech = part.action == "speak"
-            if not self._is_echo(part) if is_speech else self._exchange.pair.may_be_answered_with(part.action):
+            may_answer = not self.is_beside and self._exchange.pair.may_be_answered_with(part.action)
+            if not self._is_echo(part) if is_speech else may_answer:
                 is_gesture_of_answer = reading == "answer" and not is_speech
-                if sign is not None and is_gesture_of_answer and self._awaits_words_before(sign, part, at):
+                if sign is not None and is_gesture_of_answer and self._awaits_words_before(sign, part):
                     sign.outlasting = part
                 else:
                     self._takes_floor(part, at, reading)
                 return
 
-    def _awaits_words_before(self, sign: ListenerSign, part: SignPart, at: Seconds) -> bool:
-        """True if words may come of the last speech of the sign, and it began before a part of it."""
+    def _awaits_words_before(self, sign: ListenerSign, part: SignPart) -> bool:
+        """True if words may still come of the last speech of the sign, and it began before a part of it."""
         if not self._scene.is_worded or sign.is_wordless or not sign.speeches:
             return False
         speech = sign.speeches[-1]
-        may_come = at < speech.since + WORDS_WAIT and not self._asks_for_nothing(speech)
+        may_come = self._writer.now < speech.since + WORDS_WAIT and not self._asks_for_nothing(speech)
         return may_come and speech.since < part.since
 
     def understand(self, speech: SignPart, at: Seconds, *, in_turn: bool, is_last: bool) -> None:
@@ -186,18 +189,18 @@ class Listener:
                 self._tell(speech, at)  # the robot need not wait until it is over
             self.judge(at)
             return
-        listens = self._is_listening(speech)
-        is_new = speech.taken_for == "noise" and (in_turn or is_last)
-        if listens is False and (is_new or (in_turn and speech.taken_for == "backchannel")):
+        listens, taken = self._is_listening(speech), speech.taken_for
+        is_new = taken == "noise" and (in_turn or is_last)
+        if listens is False and (is_new or (in_turn and taken == "backchannel")):
             is_over = (self._scene.robot_speaks_since or inf) > speech.since  # the words into which it was said
             self._is_turn(speech, "answer" if is_over and not in_turn else "interruption", at)
-        elif listens and speech.taken_for == "backchannel" and in_turn:
-            self._tell(speech, at)  # it is that of the nod beside it, which has been told
         elif listens and (is_new or self._exchange.pair.was_listening(speech.since)):
             if speech.until is None:
                 self._joins(speech)
             else:
                 self._listens(ListenerSign([speech]), speech.until)
+        elif listens and in_turn and (taken == "backchannel" or (taken and self._exchange.pair.is_interrupted)):
+            self._tell(speech, at)  # it is that of the nod beside it, or more of the answer, which have been told
 
     # -- what it is ---------------------------------------------------------------------------------------------
 
@@ -208,9 +211,10 @@ class Listener:
         for speech in sign.speeches:
             self._tell(speech, until)
             speech.taken_for = "noise" if self._is_noise(speech) else "backchannel"
-        parts = [part for part in sign.parts if part.taken_for != "noise"]
-        if all(part.action == "point" for part in parts):
-            return  # a point in the robot's turn directs the gaze, and says nothing
+        # A point in the robot's turn directs the gaze, and says nothing.
+        parts = [part for part in sign.parts if part.taken_for != "noise" and part.action != "point"]
+        if not parts:
+            return
         told = ListenerSign(parts)
         self._backchannel.speaks(
             OngoingEvent(
@@ -227,7 +231,7 @@ class Listener:
         """Take a part of the sign as a turn of the person since it began. Speech before it was a listener's."""
         beside: list[Seconds] = []
         for speech in self.sign.speeches if self.sign is not None else ():
-            if speech.since < part.since:
+            if speech.since <= part.since and speech is not part:
                 self._tell(speech, at)
             elif speech is not part:  # it goes on beside the gesture that answers, and is of that answer
                 self._read(speech.since, reading, at)
@@ -258,8 +262,7 @@ class Listener:
 
     def _is_listening(self, speech: SignPart) -> bool | None:
         """True if the words of a speech are a listener's; None: there are none, as far as is known."""
-        words = self._writer.text_of(self._id, speech.since)
-        return is_listening(words) if says_words(words) else None
+        return is_listening(speech.words) if says_words(speech.words) else None
 
     def _is_noise(self, speech: SignPart) -> bool:
         """True if no words of a speech are known, where they would be."""

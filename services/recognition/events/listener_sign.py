@@ -32,12 +32,16 @@ WORDS_WAIT: Seconds = 1.5
 
 
 class SignPart(Struct):
-    """A speech, or a gesture. until: None: it goes on. taken_for: of speech: what it has turned out to be."""
+    """A speech, or a gesture. until: None: it goes on. words: of speech: as far as they are known by then.
+
+    taken_for: of speech: what it has turned out to be.
+    """
 
     action: Action
     since: Seconds
     confidence: Probability = 1.0
     until: Seconds | None = None
+    words: str = ""
     taken_for: Literal["", "noise", "backchannel", "turn"] = ""
 
 

@@ -4,6 +4,8 @@ It is found by the rules of `addressing`, when the speech begins and with all th
 answered the robot, and what becomes of a sound, says the talk, which tells it to the conversation in its order.
 """
 
+from math import inf
+
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.addressing import (
@@ -69,22 +71,17 @@ class OwnSpeeches:
 
     # -- what a speech is, and to whom --------------------------------------------------------------------------
 
-    def hear(self, speech: OwnSpeech, words: str, told: Addressees | None) -> None:
+    def hear(self, speech: OwnSpeech, words: str, told: Addressees | None, at: Seconds) -> None:
         """Take the words of a speech. told: addressees, if perception knows them."""
-        speech.words, speech.told = words or speech.words, told or speech.told
-        if says_words(speech.words):
+        if says_words(words):
+            speech.worded_at = at if speech.worded_at == -inf else speech.worded_at
             self.is_no_noise(speech)
+        speech.words, speech.told = words or speech.words, told or speech.told
 
     def is_no_noise(self, speech: OwnSpeech) -> None:
         """Note that a sound is no noise, or that nothing else may be known of it."""
         if speech.may_be_noise:
             speech.may_be_noise = False
-            self._scene.floor_changes += 1
-
-    def has_words_after_all(self, speech: OwnSpeech) -> None:
-        """Count a sound as said whose words have come late, beside a gesture that was told, if it is the last."""
-        if self._scene.is_last(self._id, speech.since):
-            speech.is_noise = False
             self._scene.floor_changes += 1
 
     def is_certain(self, speech: OwnSpeech, at: Seconds) -> bool:

@@ -276,10 +276,7 @@ class SessionScene:
 
     def is_last(self, person: str, since: Seconds, until: Seconds = inf) -> bool:
         """True if neither the person nor the robot has begun to say something to the other since, until then."""
-        said = [
-            each for each in self.spoken
-            if since < each.since <= until and not (each.is_noise or each.may_be_noise)
-        ]  # fmt: skip
+        said = [each for each in self.spoken if since < each.since <= until and each.is_speech]
         robot = self.robot
         return not any(
             each.is_to(robot) if each.actor == person else each.actor == robot and each.is_to(person) for each in said
@@ -299,9 +296,7 @@ class SessionScene:
 
     def ended(self) -> list[Spoken]:
         """The speeches that were over last, in the order of their ends: of those known to be some, and to whom."""
-        known = [
-            each for each in self.spoken if each.named and not (each.is_open or each.may_be_noise or each.is_noise)
-        ]
+        known = [each for each in self.spoken if each.named and each.is_speech and not each.is_open]
         over = [(each.until, each.since, each.actor, each) for each in known if each.until is not None]
         return [one[-1] for one in sorted(over, key=lambda one: one[:-1])[-ENDED_TOLD:]]
 

@@ -53,6 +53,8 @@ class Talk(KindRecognizer):
         """What is not told yet, with its times. The first is a speech of which it is not known to whom it is."""
         self._asked_in_line: Seconds = inf
         """Start of the first turn of the robot that is in line; infinite: none is."""
+        self._asked_in_turn = ""
+        """The last turn in which the robot has asked the person."""
         self.speeches = OwnSpeeches(id, scene, config, writer)
 
     @property
@@ -102,8 +104,8 @@ class Talk(KindRecognizer):
         in_contact = self.speeches.going_on is not None and self.speeches.going_on.is_to(self._scene.robot)
         if not self._line:
             return self._conversation.deadline, in_contact
-        first = self._undecided_first()
-        return inf if first is None else self._decided_at(first), in_contact
+        first, waits = self._undecided_first(), self._conversation.listener.waits_until
+        return waits if first is None else min(self._decided_at(first), waits), in_contact
 
     def pass_time(self, at: Seconds) -> None:
         if self._line:
@@ -124,11 +126,12 @@ class Talk(KindRecognizer):
             is_for_robot = since if speech.is_to(scene.robot) else speech.faces.most_from(scene.robot, since)
             return min(at_last, max(early, is_for_robot))
         if is_known or not (scene.is_worded or scene.tells_addressees):
-            return until
+            return max(until, speech.worded_at)
         is_seen = speech.faces.most(since) == scene.robot and not scene.tells_addressees
         is_seen = is_sign and (is_seen or speech.is_to(scene.robot))
         over = until + (0.0 if is_seen else WORDS_AFTER)
-        return max(over, since + WORDS_WAIT) if is_sign or speech.is_beside else over
+        over = max(over, since + WORDS_WAIT) if is_sign or speech.is_beside else over
+        return over + ROUNDING  # words that come in this very instant count
 
     # -- the person ---------------------------------------------------------------------------------------------
 
@@ -161,24 +164,21 @@ class Talk(KindRecognizer):
         if self.speeches.going_on is not None:
             self._falls_silent(at)  # it was begun by another id, of which no end has come
         speech = self.speeches.begin(at, confidence, face)
-        speech.told, speech.words = self._scene.told_to(self.id, at), self._writer.text_of(self.id, at)
+        speech.told = self._scene.told_to(self.id, at)
+        speech.words = speech.part.words = self._writer.text_of(self.id, at)
         # What waits in line may be the robot's own turn, so that only the scene knows that it has begun.
         said = self._scene.robot_spoken
         is_into_words = said is not None and said.since <= at
         is_to_person = said is not None and said.is_to(self.id)
         speech.is_beside = is_into_words and not is_to_person
-        is_asked = self.asked_since < inf or self._conversation.exchange.pair.robot_holds_turn
-        is_in_pause = is_asked and self._scene.turn is not None and self.id in self._scene.turn[1]
+        is_in_pause = self._scene.turn is not None and self._scene.turn[0] == self._asked_in_turn
         may_be_in_turn = (is_into_words and is_to_person) or is_in_pause
-        is_into_turn = may_be_in_turn if self._line else self._conversation.is_into_turn(at)
         is_line = self._scene.lines.get(self.id) == at
         speech.may_be_noise = self._scene.is_worded and not (is_line or says_words(speech.words))
-        speech.is_into_turn = is_into_turn
-        speech.is_open = is_into_turn or speech.is_beside
+        speech.is_into_turn = may_be_in_turn if self._line else self._conversation.is_into_turn(at)
+        speech.is_open = speech.is_into_turn or speech.is_beside
         self.speeches.is_certain(speech, at)
         self.speeches.may_interrupt(speech, face, at)
-        if not self._line:
-            self._conversation.listener.next_begins()
         self._queue(at, speech)
 
     def _falls_silent(self, at: Seconds) -> None:
@@ -228,18 +228,35 @@ class Talk(KindRecognizer):
         if speech is None:
             self._writer.interject_again(self.id, since, at)
             return
-        self.speeches.hear(speech, words, told)
+        self.speeches.hear(speech, words, told, at)
         if not speech.is_heard or speech.is_noise:
             self._has_news(speech, at)
-        self.take(at, lambda talk: self._judge(talk, speech, at))
+        known, is_in_time = speech.words, self._is_in_time(speech, at)
+        self.take_early(since if is_in_time else at, lambda talk: self._judge(talk, speech, known, at))
         self.go_on(at)
 
-    def _judge(self, talk: Dialogue, speech: OwnSpeech, at: Seconds) -> None:
+    def _is_in_time(self, speech: OwnSpeech, at: Seconds) -> bool:
+        """True if words into the robot's words, known at `at`, count as known when the speech began.
+
+        They have been waited for, in line or by the conversation; it does not wait in line for those of who is alone.
+        """
+        is_waited_for = bool(speech.company) or self._conversation.listener.listens_to(speech.part)
+        over = (at if speech.until is None else speech.until) + WORDS_AFTER if speech.is_beside else speech.since
+        return is_waited_for and at <= max(speech.since + WORDS_WAIT, over) + ROUNDING
+
+    def _judge(self, talk: Dialogue, speech: OwnSpeech, words: str, at: Seconds) -> None:
         """Take the words of a speech in their turn; if they decide nothing they are told all the same."""
+        speech.part.words = words or speech.part.words
         talk.understand(speech.part, at)
         self._writer.interject_again(self.id, speech.since, at)
-        if speech.is_noise and speech.is_heard and says_words(speech.words):
-            self.speeches.has_words_after_all(speech)
+        if (
+            speech.is_noise
+            and speech.is_heard
+            and says_words(speech.words)
+            and self._scene.is_last(self.id, speech.since)
+        ):
+            speech.is_noise = False  # its words come late, beside a gesture that was told
+            self._scene.floor_changes += 1
 
     def _has_news(self, speech: OwnSpeech, at: Seconds) -> None:
         """Take news of a speech of which nothing is told yet: it may be for others than it seemed, and no noise."""
@@ -252,11 +269,12 @@ class Talk(KindRecognizer):
             speech.is_noise = speech.is_heard = False  # more of the words may still call it
             speech.part.taken_for = ""
         elif not speech.is_heard and not any(each is speech for _, each in self._line):
-            speech.is_noise, speech.is_heard = False, True
+            is_over_sign = speech.until is not None and (speech.is_into_turn or speech.is_beside)
+            speech.is_noise, speech.is_heard = is_over_sign, True
             speech.part.until = speech.until
             if speech.until is None:
                 self.take_early(speech.since, lambda talk: talk.speaks(speech.part, beside=speech.is_beside))
-            elif speech.is_into_turn or speech.is_beside:
+            elif is_over_sign:
                 speech.part.taken_for = "noise"  # as such it is judged by its words
             elif self._scene.is_last(self.id, speech.since):  # what either has said since may wait in line
                 self.take_early(speech.since, lambda talk: talk.exchange.take(speech.part))
@@ -284,7 +302,8 @@ class Talk(KindRecognizer):
         before = other._conversation.exchange.pair
         self._conversation.exchange.pair.take_over(before, self.id, other.id)
         for speech in other.speeches.in_order():
-            is_open = other._is_open(speech)
+            is_in_line = any(each is speech for _, each in other._line)
+            is_open = is_in_line or other._conversation.listener.listens_to(speech.part)
             speech.actor = self.id
             if speech.until is None and not goes_on:
                 speech.until = at
@@ -298,15 +317,10 @@ class Talk(KindRecognizer):
                 self._begin_again(speech)
         self.go_on(at)
 
-    def _is_open(self, speech: OwnSpeech) -> bool:
-        """True if a speech is not decided."""
-        is_in_line = any(each is speech for _, each in self._line)
-        return is_in_line or self._conversation.listener.listens_to(speech.part)
-
     def _begin_again(self, speech: OwnSpeech) -> None:
         """Put a speech in line, in its place."""
         since, until, speech.is_heard, speech.is_decided = speech.since, speech.until, False, False
-        speech.part = SignPart("speak", since, speech.part.confidence)
+        speech.part = SignPart("speak", since, speech.part.confidence, words=speech.words)
         self._line.insert(self._place(since), (since, speech))
         if until is not None:
             self._line.insert(self._place(until), (until, self._end_of(speech, until)))
@@ -337,9 +351,8 @@ class Talk(KindRecognizer):
         return next((n for n, (when, _) in enumerate(self._line) if when > at), len(self._line))
 
     def limit(self, wanted: Event) -> Seconds | None:
-        if not EVENT_KINDS[wanted.kind].is_answered:
-            return None
-        return self._config.manipulation_limit if "act" in wanted.accept else self._config.adjacency_pair_limit
+        longest = self._config.manipulation_limit if "act" in wanted.accept else self._config.adjacency_pair_limit
+        return longest if EVENT_KINDS[wanted.kind].is_answered else None
 
     def robot_asks(self, event: OngoingEvent, clock: LimitClock | None, ended: Seconds | None) -> None:
         """Take the robot's first turn, or the announcement of its backchannel."""
@@ -350,6 +363,7 @@ class Talk(KindRecognizer):
             self._scene.listening_blocks[event.block] = None
             self.take(at, lambda talk: talk.robot_announces(event, ended))
             return
+        self._asked_in_turn = event.turn
         self._take_in_order(at, lambda talk: talk.robot_asks(event))
         if self._line:
             self._asked_in_line = min(at, self._asked_in_line)
@@ -407,23 +421,21 @@ class Talk(KindRecognizer):
                 return True  # it is to be told first that this has answered for all
         if since is None or isinstance(first, CutOff):
             return since is not None and self._scene.is_contested(self.id, since)
-        if not isinstance(first, OwnSpeech) and not self._conversation.exchange.pair.may_be_answered:
-            return False  # it says nothing, and ends no question
-        return self._waits_for_others(since)
+        # Else it says nothing, and ends no question.
+        may_matter = isinstance(first, OwnSpeech) or self._conversation.exchange.pair.may_be_answered
+        return may_matter and self._waits_for_others(since)
 
     @property
     def _undecided(self) -> list[OwnSpeech]:
-        speeches = [each for _, each in self._line if isinstance(each, OwnSpeech)]
-        return [each for each in speeches if not each.is_decided and (each.to is None or each.may_be_noise)]
+        return [
+            each for _, each in self._line
+            if isinstance(each, OwnSpeech) and not each.is_decided and (each.to is None or each.may_be_noise)
+        ]  # fmt: skip
 
     def _undecided_first(self) -> OwnSpeech | None:
         """The first in line, if it is a speech that is not decided; None: it is to be told next."""
         first = self._line[0][1]
         return first if isinstance(first, OwnSpeech) and not self._is_known(first) else None
-
-    def _may_be_noise(self, speech: OwnSpeech) -> bool:
-        """True if the first speech in line may be a cough. Of who is alone with it the conversation judges."""
-        return speech.may_be_noise and bool(speech.company or not self._is_into_words(speech))
 
     def _is_into_words(self, speech: OwnSpeech) -> bool:
         """True of what is for the robot, as far as is known, and into its words: the conversation says what it is."""
@@ -432,12 +444,19 @@ class Talk(KindRecognizer):
         return is_into_words and (may_be if speech.to is None else speech.is_to(self._scene.robot))
 
     def _is_known(self, speech: OwnSpeech) -> bool:
-        """True if it is known to whom the first speech in line is, and that it is one."""
-        return speech.is_decided or (speech.to is not None and not self._may_be_noise(speech))
+        """True if it is known to whom the first speech in line is, and that it is no cough.
+
+        Of who is alone with it the conversation judges, if it is into the robot's words.
+        """
+        may_be_noise = speech.may_be_noise and (speech.company or not self._is_into_words(speech))
+        return speech.is_decided or (speech.to is not None and not may_be_noise)
 
     def _queue(self, at: Seconds, speech: OwnSpeech) -> None:
-        is_next = speech.is_to(self._scene.robot) and self._waits_for_others(at)
-        if self._line or not self._is_known(speech) or is_next:
+        if (
+            self._line
+            or not self._is_known(speech)
+            or (speech.is_to(self._scene.robot) and self._waits_for_others(at))
+        ):
             self._line.append((at, speech))
         else:
             self._tell(speech)
@@ -482,12 +501,11 @@ class Talk(KindRecognizer):
 
     def go_on(self, now: Seconds) -> None:
         """Tell all in line up to the next speech of which it is not known to whom it is."""
+        if self._line and (waits := self._conversation.listener.waits_until) <= now:
+            self._conversation.pass_time(waits)
         while self._line:
             at, item = self._line[0]
             self._catch_up(at)
-            if isinstance(item, OwnSpeech):
-                self._conversation.listener.next_begins()
-                self._catch_up(at)  # the sign may have held the pair
             if (speech := self._undecided_first()) is not None:
                 if self._decided_at(speech) > now:
                     break
