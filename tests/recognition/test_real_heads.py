@@ -96,7 +96,7 @@ def ranked(above: list[float], below: list[float]) -> float:
 
 
 def sure_looks(name: str) -> SureLooks:
-    """What is learned where it is known that somebody looks at the robot, for a second each. Deviations: as of eyes."""
+    """What is learned while it is known that somebody looks at the robot; deviations are as eyes state them."""
     sure = SureLooks()
     for at, _, _, angle in recordings()[name]:
         if int(at) % 2 == 0:
