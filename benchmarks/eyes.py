@@ -32,6 +32,7 @@ from engage_hri.services.perception.eyes.sources.litert import FaceFinder
 from engage_hri.services.recognition.perceive.sure_looks import Angles, SureLooks
 from tests.perception.eyes.cases import CHUNKS, cases
 from tests.perception.eyes.fetched import MODELS
+from tests.perception.eyes.film_of_looks import habit, stray
 from tests.perception.eyes.page_faces import found as found_by_page
 from tests.perception.eyes.people import CAMERA, JUDGED
 
@@ -132,18 +133,31 @@ def summary(rows: Sequence[Measured]) -> dict[str, float]:
 
 
 def after_sure_looks(rows: Sequence[Measured]) -> dict[str, float]:
-    """Figures of the other pictures when the first ones of each person were looks of which it is known at what."""
-    wrong = []
+    """Figures of the other pictures when the first ones of each person were looks of which it is known at what.
+
+    Each head goes its own share of the way from the robot to what is looked at, as people's do (`film_of_looks`).
+    """
+    before, after = [], []
     for person in sorted({row.person for row in rows}):
-        own, looks = [row for row in rows if row.person == person and row.yaw is not None], SureLooks()
-        looks.remember(SureLook(head=row.told, aim=row.true, spread=row.stated) for row in own[:SURE])
-        wrong += [np.subtract(looks.aim(row.told, row.stated)[0], row.true) for row in own[SURE:]]
-    yaw, pitch = np.array(wrong).T
-    figures = {
-        "after six sure looks: beside the truth, mean": np.hypot(yaw, pitch).mean(),
-        "... yaw, bias": yaw.mean(),
-        "... pitch, bias": pitch.mean(),
-    }
+        chance = np.random.default_rng([37, person])
+        share = np.array(habit(chance))
+        seen = [row for row in rows if row.person == person and row.yaw is not None]
+        aims = [(np.array(row.true) - stray(chance)[:2]) / share for row in seen]
+        own, looks = [*zip(seen, aims, strict=True)], SureLooks()
+        looks.remember(
+            SureLook(head=row.told, aim=(float(aim[0]), float(aim[1])), spread=row.stated) for row, aim in own[:SURE]
+        )
+        for known, wrong in ((SureLooks(), before), (looks, after)):
+            wrong += [np.subtract(known.aim(row.told, row.stated)[0], aim) for row, aim in own[SURE:]]
+    figures = {}
+    for name, wrong in (("no sure look", before), ("six sure looks", after)):
+        yaw, pitch = np.array(wrong).T
+        figures |= {
+            f"what is looked at after {name}, beside, mean": np.hypot(yaw, pitch).mean(),
+            "... median, " + name: np.median(np.hypot(yaw, pitch)),
+            "... yaw, bias, " + name: yaw.mean(),
+            "... pitch, bias, " + name: pitch.mean(),
+        }
     return {name: round(float(value), 2) for name, value in figures.items()}
 
 

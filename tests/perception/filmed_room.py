@@ -46,7 +46,7 @@ from engage_hri.services.tangram.table import tangram_table
 from tests.perception.echoes import room as way_through_a_room
 from tests.perception.eyes.drawing import Picture
 from tests.perception.eyes.fetched import MODELS
-from tests.perception.eyes.film_of_looks import GRAINS, TURN, head_at, stray
+from tests.perception.eyes.film_of_looks import GRAINS, TURN, habit, head_at, stray
 from tests.perception.eyes.people import CAMERA, JUDGED, Light, Person, Pose
 from tests.perception.eyes.people import drawn as drawn_people
 from tests.perception.pieces.tables import EVEN, EYE, STARTS, TABLE, THICK, TOP, Hand
@@ -110,7 +110,7 @@ class FilmedRoom:
         )
         self._chance = np.random.default_rng(seed)
         self._model = Person(JUDGED[looks])
-        self._share = self._chance.uniform(0.7, 0.95), self._chance.uniform(0.5, 0.75)
+        self._share = habit(self._chance)
         self._strays: dict[str, Vector] = {}
         """By how much the head is beside its habit, for each thing that is looked at."""
         self._target, self._since = "", -math.inf

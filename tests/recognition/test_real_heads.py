@@ -19,6 +19,7 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.perceive.attending import Attending
 from engage_hri.services.recognition.perceive.gaze_targets import ROBOT_FACE
+from engage_hri.services.recognition.perceive.sure_looks import SureLooks
 from engage_hri.services.recognition.recognizer import Recognizer
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
 from tests.recognition.observations import ROBOT, stamp
@@ -92,6 +93,27 @@ def ranked(above: list[float], below: list[float]) -> float:
     """Share of the pairs of which the first is above the second: the area under the ROC curve."""
     pairs = [(one, other) for one in above for other in below]
     return sum(one > other or 0.5 * (one == other) for one, other in pairs) / len(pairs)
+
+
+def sure_looks(name: str) -> SureLooks:
+    """What is learned while it is known that somebody looks at the robot; deviations are as eyes state them."""
+    sure = SureLooks()
+    for at, _, _, angle in recordings()[name]:
+        if int(at) % 2 == 0:
+            sure.take((0.0, -angle), (0.0, 0.0), (2.7, 5.5), at)
+        else:
+            sure.rest()
+    return sure
+
+
+@pytest.mark.parametrize("name", ["engaged_1", "engaged_2", "engaged_3"])
+def test_a_head_that_is_far_beside_the_robot_in_sure_looks_is_learned_as_it_is(name: str) -> None:
+    """The first such look alone may have been at something else. Within what is stated, from four looks on."""
+    sure, angles = sure_looks(name), [angle for *_, angle in recordings()[name]]
+
+    assert len(sure.looks) >= 4
+    assert sure.at_robot is not None
+    assert sure.at_robot[1] == pytest.approx(sum(angles) / len(angles), abs=5.5)
 
 
 @pytest.mark.parametrize("of", ["mean", "last"])

@@ -77,7 +77,7 @@ def filmed(number: int, looks: int) -> FilmedPerson:
     places = {each.id: each.position for each in world().entities if each.kind != "surface"}
     ahead, left, up = chance.uniform((1.05, -0.12, 1.13), (1.25, 0.12, 1.25)).tolist()
     eyes: Vector = (ahead, left, up)
-    share = chance.uniform(0.7, 0.95), chance.uniform(0.5, 0.75)
+    share = habit(chance)
     pieces = [PIECES[k] for k in chance.permutation(len(PIECES))]
     parts = (("robot", 0.24), (SURFACE, 0.12), (BESIDE, 0.12), ("", 0.1))
     rest = [name for name, part in parts for _ in range(round(part * looks))]
@@ -101,6 +101,11 @@ def filmed(number: int, looks: int) -> FilmedPerson:
         chance.uniform(0.5, 0.9), chance.uniform(0.25, 0.45), chance.uniform(-50, 50), chance.uniform(10, 50)
     )
     return FilmedPerson(number, eyes, made, light)
+
+
+def habit(chance: np.random.Generator) -> tuple[float, float]:
+    """Shares of the way to the side, and up or down, that a head goes; the eyes go the rest."""
+    return chance.uniform(0.7, 0.95), chance.uniform(0.5, 0.75)
 
 
 def stray(chance: np.random.Generator) -> Vector:
