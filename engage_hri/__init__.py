@@ -71,6 +71,7 @@ if TYPE_CHECKING:
     from engage_hri.services.control.contract.body import MovementAuthority as MovementAuthority
     from engage_hri.services.control.contract.body import Reached as Reached
     from engage_hri.services.generation.head.policy import HeadPolicy as HeadPolicy
+    from engage_hri.services.generation.head.policy import RobotSign as RobotSign
     from engage_hri.services.generation.turns.policy import TurnPolicy as TurnPolicy
 
 _PLACES = {
@@ -105,7 +106,7 @@ _PLACES = {
     "engage_hri.services.control.bases.one_part_motion": ("OrdinaryBody",),
     "engage_hri.services.control.bases.setpoints": ("SetPointBody", "SimulatedServos"),
     "engage_hri.services.client.language_models": ("perform_call", "stream"),
-    "engage_hri.services.generation.head.policy": ("HeadPolicy",),
+    "engage_hri.services.generation.head.policy": ("HeadPolicy", "RobotSign"),
     "engage_hri.services.generation.turns.policy": ("TurnPolicy",),
 }
 _MODULES = {name: module for module, names in _PLACES.items() for name in names}
@@ -143,6 +144,7 @@ __all__ = [
     "RequestRefused",
     "Robot",
     "RobotSaid",
+    "RobotSign",
     "RobotTurn",
     "RunFailed",
     "SetPointBody",

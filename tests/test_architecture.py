@@ -62,7 +62,7 @@ LAYERS = {
     "services/web": "links serving > guard outbox > https tokens",
     "services/frameworks": "livekit pipecat realtime > written_turn",
     "services/door": "service > server > openapi > operations speaking > config",
-    "services/text": "ear own_words > marks > patterns > ends listening",
+    "services/text": "ear own_words > marks > patterns > calling ends listening",
     "services/bus": "memory zenoh > certificates > interface > subscription > samples > config deadlines journal"
     " keyring",
     "services/control": "mujoco reachy_mini torso > figure service testing > bases calibrating serving voice"

@@ -16,14 +16,12 @@ other (Kendon 1967, Acta Psychologica 26). So the silence that ends a turn is co
 `EndOfTurn` has the rule; another one, such as a model of the sound, is a class with its method `silence`.
 """
 
-import re
 from collections import deque
-from collections.abc import Iterable
 
 from msgspec import Struct
 
 from engage_hri.schemas.units import Probability, Seconds
-from engage_hri.services.text.ends import ends
+from engage_hri.services.text.ends import leaves_open
 
 COMPLETE: Seconds = 0.35
 UNSURE: Seconds = 0.7
@@ -38,23 +36,6 @@ PAUSES = 8
 """Number of a person's pauses that are remembered."""
 LONGEST: Seconds = 2.5
 """Silence that ends any turn."""
-
-_OPEN = {
-    "en": "a an the and or but because so if when that which who whose with without of to from for in on at by as"
-    " than my your his her its our their this these those is are was were am be do does did can could will would"
-    " shall should may might must have has had not very um uh er hm well like maybe i you we they he she it let's",
-    "de": "ein eine einen einem einer der die das den dem des und oder aber weil wenn dass ob mit ohne von zu zum zur"
-    " aus für in im an am auf bei als wie mein dein sein ihr unser dieser diese dieses ist sind war waren kann könnte"
-    " will würde soll muss hat habe nicht sehr äh ähm hm also vielleicht ich du wir er sie es",
-    "fr": "un une le la les des du de et ou mais parce que si quand avec sans pour dans sur à au aux mon ma mes ton"
-    " ta est sont était peut veux pas très euh ben je tu nous vous il elle on",
-    "es": "un una el la los las del de y o pero porque que si cuando con sin para por en a al mi tu su es son era"
-    " puede quiero no muy eh pues yo tú nosotros él ella",
-    "it": "un uno una il lo la i gli le del della di e o ma perché che se quando con senza per in a al mio tuo suo è"
-    " sono era può voglio non molto eh allora io tu noi lui lei",
-}
-"""Words behind which a turn is not over, by language: more of the sentence must follow."""
-_OPEN_WORDS = {language: frozenset(words.split()) for language, words in _OPEN.items()}
 
 
 class SoFar(Struct, frozen=True, kw_only=True):
@@ -96,22 +77,6 @@ class EndOfTurn:
         if is_open is not False and turn.pauses:
             rest = max(rest, sorted(turn.pauses)[len(turn.pauses) * 3 // 4] + 0.1)
         return min(rest, LONGEST)
-
-
-def leaves_open(text: str, language: str = "") -> bool | None:
-    """Tell whether more must follow these words; None: they do not tell.
-
-    language: as `en`; one whose words nobody knows, or none: the words of all languages count.
-    """
-    stripped = text.rstrip()
-    if not stripped or stripped.endswith(("...", "…", ",", "-", "–", ":")):
-        return True if stripped else None
-    if ends(f"{stripped} ", len(stripped)):
-        return False
-    *_, last = ("", *re.findall(r"[\w']+", stripped.casefold().replace("’", "'")))
-    listed = _OPEN_WORDS.get(language)
-    known: Iterable[frozenset[str]] = [listed] if listed is not None else _OPEN_WORDS.values()
-    return True if any(last in words for words in known) else None
 
 
 class PersonPauses:

@@ -66,8 +66,12 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     policies_off: tuple[str, ...] = ()
     """Names of policies that the robot does not follow. Of the head: "glance", "aversion" (it looks away from faces),
     "response", "mutual" (it keeps eyes that it has met), "listening" (it looks at who speaks), "hands", "face",
-    "nods". Of turns: "leaving" (a turn ends when its addressees have gone), "silence" (when its client sends no
-    more), "interruption", "next-speaker" (to whom of several it gives the turn). Or one of an installed package."""
+    "continuers" (it says "mm-hmm" to who speaks for long), "nods". Of turns: "leaving" (a turn ends when its
+    addressees have gone), "silence" (when its client sends no more), "interruption", "next-speaker" (to whom of
+    several it gives the turn). Or one of an installed package."""
+    continuers: tuple[str, ...] = ("mm-hmm", "uh-huh")
+    """Words that the robot says, in turn, to who speaks to it for long. Policy "continuers"; other languages have
+    other ones."""
     decision_patience: Seconds = 8.0
     """Seconds after a block's end for which undecided connection events may delay the fragment's outcome. Ours."""
     glance_factor: float = 1.0

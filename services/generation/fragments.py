@@ -121,6 +121,11 @@ class Fragments:
     def policies(self) -> Followed[TurnPolicy]:
         return self._turns.policies
 
+    @property
+    def holds_the_turn(self) -> bool:
+        """True while a turn of the robot goes on, or is to begin."""
+        return self._turns.holds_the_turn
+
     # -- what arrives ---------------------------------------------------------------------------------------------
 
     def full(self, waiting: int, id: str) -> Fault | None:

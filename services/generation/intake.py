@@ -46,7 +46,7 @@ from engage_hri.services.generation.exchange import (
 )
 from engage_hri.services.generation.fragment_check import lacks_people
 from engage_hri.services.generation.fragments import Fragments
-from engage_hri.services.generation.head.arbiter import Arbiter, Nod, Shift
+from engage_hri.services.generation.head.arbiter import Arbiter, Shift, SignOrder
 from engage_hri.services.generation.inhibitions import Leases
 from engage_hri.services.generation.policies import Policies
 from engage_hri.services.reports.action_reports import REPORT_GRACE, ActionReports
@@ -376,6 +376,7 @@ class GenerationIntake:
     def _rule(self, now: Seconds) -> None:
         """Decide on the head."""
         self._arbiter.inhibit(self._leases.inhibition)
+        self._arbiter.has_turn(self._fragments.holds_the_turn)
         ruling = self._arbiter.rule(now)
         for followed in (self._arbiter.policies, self._fragments.policies):
             while followed.mistakes:
@@ -389,10 +390,10 @@ class GenerationIntake:
             # A shift waits for the one before it: the eyes would come to where they are not to be, and leave at once.
             self._outputs += [CancelRequest(id, why) for id in self._shifts]
             self._shifts[self._send(ruling.shift)] = ruling.shift.id
-        if ruling.nod is not None:
-            self._send(ruling.nod)
+        if ruling.sign is not None:
+            self._send(ruling.sign)
 
-    def _send(self, order: Shift | Nod) -> str:
+    def _send(self, order: Shift | SignOrder) -> str:
         """Send an order of the arbiter to the realizer. Returns the id of the request."""
         id = f"{self._session}/{order.id}"
         self._outputs.append(SendRequest(keys.BLOCK, PerformBlock(id=id, block=order.block)))

@@ -6,6 +6,7 @@ import pytest
 
 from engage_hri import perceive
 from engage_hri.schemas.fragments import HeadOwner
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
 from engage_hri.schemas.recognition import Floor, FloorSpeech
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.memory import MemoryHub
@@ -46,6 +47,37 @@ def asked(stage: Stage, state: str, responder: str = "ann") -> None:
 def looks(stage: Stage) -> list[tuple[float, str]]:
     """Where the head was sent, and when."""
     return [(at, target) for at, _, target in stage.shifts if at >= 10.0]
+
+
+def look_at(stage: Stage, actor: str, target: str) -> None:
+    stage.feed(ActionBegan(actor=actor, action="look", targets=(target,), at=AT))
+
+
+@pytest.mark.parametrize(("at", "looked_at"), [("robot", "cem"), ("ben", "ben"), ("", "ben")])
+def test_of_two_who_speak_it_looks_at_the_one_who_looks_at_it(at: str, looked_at: str) -> None:
+    stage = company()
+    look_at(stage, "ben", "cem")
+    if at:
+        look_at(stage, "cem", at)
+    speak(stage, 11.0, "ben")
+    speak(stage, 13.0, "ben", "cem")
+    stage.until(15.0)
+
+    assert stage.owners[-1][2] == looked_at
+
+
+@pytest.mark.parametrize("news", [ActionEnded(actor="ben", action="look", targets=("robot",), at=AT),
+                                  ActorLost(actor="ben", at=AT)])  # fmt: skip
+def test_who_looks_at_it_no_longer_has_no_more_claim_than_others(news: object) -> None:
+    stage = company()
+    look_at(stage, "ben", "robot")
+    stage.feed(news, ActorFound(actor="ben", at=AT))
+    speak(stage, 11.0, "ben")
+    look_at(stage, "cem", "robot")
+    speak(stage, 13.0, "ben", "cem")
+    stage.until(15.0)
+
+    assert stage.owners[-1][2] == "cem"
 
 
 def test_it_looks_at_the_speaker_soon_and_comes_back_after_the_speech() -> None:

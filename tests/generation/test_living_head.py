@@ -163,7 +163,11 @@ def test_eyes_that_it_has_sought_and_met_are_not_left_for_a_hand(off: tuple[str,
 
 
 def nods(stage: Stage) -> list[tuple[float, str]]:
-    return [(round(at, 3), ruling.nod.person) for at, ruling in stage.timed if ruling.nod is not None]
+    return [(at, person) for at, person, _ in signs(stage)]
+
+
+def signs(stage: Stage) -> list[tuple[float, str, str]]:
+    return [(round(at, 3), *ruling.sign.sign) for at, ruling in stage.timed if ruling.sign is not None]
 
 
 def say(stage: Stage, at: float, words: str) -> None:
@@ -193,6 +197,45 @@ def test_a_pause_between_words_invites_the_nod_and_without_one_it_comes_late() -
     assert nods(talks) == [(LISTENS + UNINVITED, "ann")]
 
 
+def told_long(stage: Stage, *pauses: tuple[float, str]) -> list[tuple[float, str, str]]:
+    """Signs to ann, who speaks from 0 on without a break but for pauses of 1 s after these times and words."""
+    speak(stage, "ann")
+    silent = {round(at, 1) for at, _ in pauses}
+    ends = dict(pauses)
+    at = 0.5
+    while at < 40.0:
+        say(stage, at, f"so on {at} {ends.get(at, 'blue')}")
+        at += 1.5 if round(at, 1) in silent else 0.5
+    return signs(stage)
+
+
+def test_a_pause_after_words_that_may_be_all_invites_a_word_with_the_second_nod() -> None:
+    found = told_long(before_a_table("aversion"), (3.0, "piece"), (9.5, "piece"), (16.0, "piece"), (22.5, "piece"))
+
+    assert [(at, words) for at, _, words in found[:4]] == [(3.6, ""), (10.1, "mm-hmm"), (16.6, ""), (23.1, "uh-huh")]
+
+
+@pytest.mark.parametrize("end", ["the", "and", "piece?", "piece,"])
+def test_words_after_which_more_must_follow_or_an_answer_invite_a_nod_alone(end: str) -> None:
+    found = told_long(before_a_table("aversion"), (3.0, "piece"), (9.5, end))
+
+    assert [(at, words) for at, _, words in found[:2]] == [(3.6, ""), (10.1, "")]
+
+
+def test_without_the_policy_and_without_a_pause_no_word_is_said() -> None:
+    pauses = ((3.0, "piece"), (9.5, "piece"), (16.0, "piece"))
+
+    assert {words for *_, words in told_long(before_a_table("aversion", "continuers"), *pauses)} == {""}
+    assert {words for *_, words in told_long(before_a_table("aversion"))} == {""}
+
+
+def test_in_a_turn_of_the_robot_there_is_no_sign_though_it_is_silent() -> None:
+    stage = before_a_table("aversion")
+    stage.do(lambda arbiter: arbiter.has_turn(True))
+
+    assert told_long(stage, (3.0, "piece"), (9.5, "piece")) == []
+
+
 def test_nobody_is_nodded_to_who_is_brief_or_speaks_to_others_or_while_the_robot_speaks_or_is_held() -> None:
     brief, aside, speaking, held = (before_a_table("aversion") for _ in range(4))
     speak(brief, "ann")
@@ -212,7 +255,7 @@ def test_a_nod_is_announced_as_a_backchannel_before_it_is_seen() -> None:
     stage = before_a_table("aversion")
     speak(stage, "ann")
     stage.until(LISTENS)
-    ordered = stage.rulings[-1].nod
+    ordered = stage.timed[-1][1].sign
 
     assert ordered is not None
     told, nod = ordered.block.behaviors

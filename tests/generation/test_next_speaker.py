@@ -39,6 +39,9 @@ def among(*speeches: tuple[float, str], **config: object) -> RobotTurns:
         ("Do you see it, CY?", ("cy", "ann", "bob")),
         ("Bob has found it. Do you see it?", ("ann", "bob", "cy")),
         ("It is a bobsled.", ("ann", "bob", "cy")),
+        ("That is Bob's, isn't it?", ("ann", "bob", "cy")),
+        ("Do you see what Bob has found?", ("ann", "bob", "cy")),
+        ("Hey Bob, do you see it?", ("bob", "ann", "cy")),
     ],
 )
 def test_who_is_named_in_the_last_sentence_is_given_the_turn(text: str, order: tuple[str, ...]) -> None:

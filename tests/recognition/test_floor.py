@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from engage_hri.schemas.recognition import Interjection
 from tests.recognition.event_stories import check
 from tests.recognition.observations import HUMAN, ROBOT, Log
 from tests.stories import Story, each
@@ -14,6 +15,12 @@ STORIES = """
 an uh-huh of the robot in a pause answers nobody
     1 human +speak; 3 human -speak; 3.3 asks bc block=b; 3.3 robot +speak b:s; 3.7 robot -speak b:s
     3.9 human +speak; 6 human -speak; 6.5 robot +speak; 8 robot -speak
+    human's ap-1: started 1, succeeded 6.5 after 0.5 by speak, completed 8 lasting 1.5
+    human's bc-1: started 3.3, succeeded 3.3, completed 3.7 lasting 0.4
+
+who speaks again over an uh-huh of the robot speaks into nothing, and has the floor
+    1 human +speak; 3 human -speak; 3.3 asks bc block=b; 3.3 robot +speak b:s; 3.5 human +speak; 3.7 robot -speak b:s
+    6 human -speak; 6.5 robot +speak; 8 robot -speak
     human's ap-1: started 1, succeeded 6.5 after 0.5 by speak, completed 8 lasting 1.5
     human's bc-1: started 3.3, succeeded 3.3, completed 3.7 lasting 0.4
 
@@ -124,3 +131,20 @@ def test_the_delay_of_a_robots_answer_is_its_start_less_the_end_of_what_it_answe
     assert told.at.seconds == pytest.approx(max(start, end))
     assert log.states(persons[0]) == ["started", "succeeded", "completed"]
     assert len(pairs) == 1 + announced
+
+
+def test_an_uh_huh_of_the_robot_is_no_speech_and_nobody_speaks_into_it() -> None:
+    log = Log(HUMAN)
+    log.begins(HUMAN, "speak", 1.0)
+    log.requests_event("backchannel", 2.0, responder=HUMAN, block="b")
+    log.begins(ROBOT, "speak", 2.0, behavior="b:words")
+    assert [each.actor for each in log.session.floor()] == [HUMAN]
+
+    log.ends(HUMAN, "speak", 2.1)
+    log.begins(HUMAN, "speak", 2.2)
+    log.ends(ROBOT, "speak", 2.4, behavior="b:words")
+    log.block_ends(2.4, block="b")
+    log.until(9.0)
+
+    assert [each.actor for each in log.session.scene.spoken] == [HUMAN, HUMAN]
+    assert not [each for each in log.effects if isinstance(each, Interjection)]

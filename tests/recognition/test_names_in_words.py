@@ -7,9 +7,9 @@ from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, 
 from engage_hri.schemas.recognition import Floor, SamePeople, SamePerson
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.events.addressing import named
 from engage_hri.services.recognition.intake import Content, Intake
 from engage_hri.services.runtime.intake import Input, PublishMessage, StepClock
+from engage_hri.services.text.calling import called as named
 from tests.recognition.observations import ROBOT, stamp
 
 

@@ -1,4 +1,4 @@
-"""Command `engage export`: a recording as annotations for ELAN, as a table, as lines, or its settings."""
+"""Command `engage export`: a recording as annotations for ELAN, a table, a script, lines, or its settings."""
 
 import time
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from engage_hri.services.commandline.shell.sources import STDIN
 if TYPE_CHECKING:
     from engage_hri.services.recording.reading import Recording
 
-ENDINGS = {"elan": ".eaf", "csv": ".csv", "lines": ".jsonl", "settings": ".settings.toml"}
+ENDINGS = {"elan": ".eaf", "csv": ".csv", "script": ".txt", "lines": ".jsonl", "settings": ".settings.toml"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,6 +24,9 @@ class Options:
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A recording of `engage record`.", show_default=False)]
     elan: Annotated[bool, typer.Option("--elan", help="Tiers for ELAN, FILE.eaf.")] = False
     csv: Annotated[bool, typer.Option("--csv", help="Tiers as a table, FILE.csv.")] = False
+    script: Annotated[
+        bool, typer.Option("--script", help="Who said what to whom, looked at whom, and was answered: FILE.txt.")
+    ] = False
     lines: Annotated[bool, typer.Option("--lines", help="The lines of `engage watch --json`, FILE.jsonl.")] = False
     settings: Annotated[
         bool, typer.Option("--settings", help="Settings of the services, FILE.settings.toml, as for --config.")
@@ -65,7 +68,7 @@ def _path(options: Options, name: str) -> Path:
 
 def _made(name: str, path: Path, recording: "Recording", options: Options) -> bytes:
     """Content of one file. path: where it will be."""
-    from engage_hri.services.recording import settings, tiers
+    from engage_hri.services.recording import play_script, settings, tiers
     from engage_hri.services.recording.reading import BILLION
 
     match name:
@@ -76,6 +79,8 @@ def _made(name: str, path: Path, recording: "Recording", options: Options) -> by
             return tiers.eaf(tiers.tiers(recording), date=date, media=media)
         case "csv":
             text = tiers.table(tiers.tiers(recording))
+        case "script":
+            text = play_script.script(recording)
         case "lines":
             text = lines_of(recording)
         case _:

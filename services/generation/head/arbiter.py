@@ -16,8 +16,9 @@ from collections.abc import Mapping
 
 from msgspec import Struct
 
-from engage_hri.schemas.behaviors import After, Constraint, Event, GazeShift, Head, Timing
+from engage_hri.schemas.behaviors import After, Constraint, Event, GazeShift, Head, Speech, Timing
 from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.documents.prosody import marked_up
 from engage_hri.schemas.fragments import Claim
 from engage_hri.schemas.recognition import Statistics
 from engage_hri.schemas.units import Degrees, Probability, Radians, Seconds
@@ -27,7 +28,7 @@ from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.followed import Followed, arranged
 from engage_hri.services.generation.head.orders import FragmentPolicy, InhibitionPolicy
 from engage_hri.services.generation.head.policies import OWN
-from engage_hri.services.generation.head.policy import HeadPolicy
+from engage_hri.services.generation.head.policy import HeadPolicy, RobotSign
 from engage_hri.services.generation.head.scene import NOBODY, HeadScene, Observation
 from engage_hri.services.generation.inhibitions import Inhibition
 from engage_hri.services.generation.turns.continuation import Continuation
@@ -51,6 +52,8 @@ RETRY: Seconds = 1.0
 all the time. Ours."""
 NOD: Probability = 0.3
 """How large a nod is that says no more than that the robot listens: less than an answer's. Ours."""
+CONTINUER_PITCH = "high"
+"""How a listener's word is said: higher than words elsewhere, and as loud as they are (`continuer_policy.py`)."""
 UP_RIGHT: Degrees = 60.0
 """Angle past the table: as far as the neck turns, at nothing that anybody could mean. Thesis 5.3."""
 
@@ -95,20 +98,25 @@ class Shift(Struct, frozen=True):
         return Block(id=self.id, behaviors=(shift, event))
 
 
-class Nod(Struct, frozen=True):
-    """An order to nod to a person, who speaks: a backchannel, of which recognition has to know before it sees it."""
+class SignOrder(Struct, frozen=True):
+    """An order to give a person who speaks a sign. Recognition has to know of it before it sees or hears it."""
 
     id: str
-    person: str
+    sign: RobotSign
 
     @property
     def block(self) -> Block:
+        person, words = self.sign
+        parts: list[Head | Speech] = [Head(id="nod", lexeme="NOD", amount=NOD)]
+        if words:
+            markup = marked_up(words, (), 0, len(words), pitch=CONTINUER_PITCH)
+            parts.insert(0, Speech(id="words", text=words, markup=markup))
         event = Event(
-            id="backchannel", kind="backchannel", responder=self.person, cause="maintenance", needs=("nod",)
+            id="backchannel", kind="backchannel", responder=person, cause="maintenance", needs=(parts[0].id,)
         )
-        first = Constraint(id="first", operators=(After(ref="backchannel:start", syncs=("nod:start",)),))
-        nod = Head(id="nod", lexeme="NOD", amount=NOD)
-        return Block(id=self.id, behaviors=(event, nod), constraints=(first,))
+        starts = tuple(f"{each.id}:start" for each in parts)
+        first = Constraint(id="first", operators=(After(ref="backchannel:start", syncs=starts),))
+        return Block(id=self.id, behaviors=(event, *parts), constraints=(first,))
 
 
 class Ruling(Struct, frozen=True):
@@ -119,7 +127,7 @@ class Ruling(Struct, frozen=True):
     waiting: tuple[Claim, ...]
     changed: bool
     shift: Shift | None = None
-    nod: Nod | None = None
+    sign: SignOrder | None = None
 
 
 class Arbiter:
@@ -159,7 +167,7 @@ class Arbiter:
         """Target of the fragment's gaze that an inhibition with mode hold has found."""
         self._failed: tuple[Aim, Seconds] | None = None
         """Place that the last shift did not reach, and when to try it again."""
-        self._shifts = self._nods = 0
+        self._shifts = self._signs = 0
 
     @property
     def _owner(self) -> Claim:
@@ -212,6 +220,10 @@ class Arbiter:
 
     def speak_to(self, person: str) -> None:
         self._scene.partner, self._scene.waits = person, False
+
+    def has_turn(self, has: bool) -> None:
+        """Note whether the robot has a turn, which it may not have begun yet."""
+        self._scene.has_turn = has
 
     def says(self, words: float) -> None:
         """Note how many words the fragment has that is sent now."""
@@ -286,7 +298,7 @@ class Arbiter:
         self.policies.ask(lambda policy: policy.has_head(owner.kind == policy.kind, now))
         self._waiting = tuple(claim for claim in claims if claim.kind != owner.kind)
         changed = owner != before or self._waiting != waited
-        return Ruling(owner, self._since, self._waiting, changed, self._shift(now), self._nod(now))
+        return Ruling(owner, self._since, self._waiting, changed, self._shift(now), self._sign(now))
 
     def _note_rest(self, owner: Claim, now: Seconds) -> None:
         """Note that the eyes have come to rest on the target of `owner`, if they have."""
@@ -367,13 +379,14 @@ class Arbiter:
         cause = "response" if owner.kind == "response" else "maintenance"
         return Shift(f"{cause}-{self._shifts}", aim.target, glance=owner.kind == "glance", beside=aim.beside)
 
-    def _nod(self, now: Seconds) -> Nod | None:
-        if self._owner.kind in (InhibitionPolicy.kind, FragmentPolicy.kind):
+    def _sign(self, now: Seconds) -> SignOrder | None:
+        if self._owner.kind in (InhibitionPolicy.kind, FragmentPolicy.kind) or self._scene.has_turn:
             return None
-        for person in filter(None, self.policies.ask(lambda policy: policy.nods(now))):
-            self._nods += 1
-            return Nod(f"nod-{self._nods}", person)
-        return None
+        if (sign := self.policies.first(lambda policy: policy.sign(now))) is None:
+            return None
+        self._scene.signed[sign.person] = now
+        self._signs += 1
+        return SignOrder(f"nod-{self._signs}", sign)
 
     def _aim(self) -> Aim:
         if self._owner.kind == "inhibition" and self._orders.mode == "hold":

@@ -8,8 +8,8 @@ Klein 2003), and soon after the beginning, or after the one before, none is give
 
 So the robot nods to who speaks to it, a little, in a pause between words, when they have spoken for a while, and in
 any case a while later. Of a recognizer that tells words only when all is said no pause is known: there it nods when
-the time has come. It is a nod and no word: a word would be heard over the speaker's own, and by their microphone. It
-is announced to recognition as a backchannel, so that it answers nothing.
+the time has come: a nod may fall into words, where a word would be heard over them (`continuer_policy.py`). It is
+announced to recognition as a backchannel, so that it answers nothing.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import Floor
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.head.policy import HeadPolicy
+from engage_hri.services.generation.head.policy import HeadPolicy, RobotSign
 from engage_hri.services.generation.head.scene import HeadScene, Observation
 
 LISTENS: Seconds = 2.5
@@ -38,8 +38,8 @@ class NodPolicy(HeadPolicy):
 
     def __init__(self, scene: HeadScene, config: GenerationConfig) -> None:
         super().__init__(scene, config)
-        self._due: dict[str, Seconds] = {}
-        """From when on each who speaks to the robot may be nodded to."""
+        self._since: dict[str, Seconds] = {}
+        """Since when each speaks to the robot."""
         self._words: dict[str, tuple[str, Seconds]] = {}
         """Last words that each has said so far, and when they came."""
         self._seen: Seconds = float("-inf")
@@ -50,30 +50,29 @@ class NodPolicy(HeadPolicy):
                 speaking = {each.actor for each in message.speeches}
                 listens = self.scene.robot not in speaking
                 to_robot = [each.actor for each in message.speeches if listens and self.scene.robot in each.to]
-                self._due = {actor: self._due.get(actor, now + LISTENS) for actor in to_robot}
+                self._since = {actor: self._since.get(actor, now) for actor in to_robot}
                 self._words = {actor: words for actor, words in self._words.items() if actor in speaking}
             case Utterance(final=False, actor=actor, text=text) if self._words.get(actor, ("",))[0] != text:
                 self._words[actor] = text, now
 
     def recognition_lost(self) -> None:
-        self._due, self._words = {}, {}
+        self._since, self._words = {}, {}
 
     @property
     def deadline(self) -> Seconds | None:
-        return min((at for actor in self._due if (at := self._invited(actor)) > self._seen), default=None)
+        return min((at for actor in self._since if (at := self._invited(actor)) > self._seen), default=None)
 
     def _invited(self, actor: str) -> Seconds:
-        """Time of the pause in which this person may be nodded to."""
-        due = self._due[actor]
+        """Time from which on this person may be given a sign, as far as words have come."""
+        due = max(self._since[actor] + LISTENS, self.scene.signed.get(actor, float("-inf")) + AGAIN)
         pause = self._words[actor][1] + PAUSE if actor in self._words else due
         return min(max(due, pause), due + UNINVITED)
 
     def claim(self, now: Seconds, weaker: Sequence[Claim]) -> None:
         self._seen = now
 
-    def nods(self, now: Seconds) -> str:
-        for actor in self._due:
-            if now >= self._invited(actor) and self.scene.head_on == actor:
-                self._due[actor] = now + AGAIN
-                return actor
-        return ""
+    def sign(self, now: Seconds) -> RobotSign | None:
+        return next((RobotSign(actor) for actor in self._since if self._may_sign(actor, now)), None)
+
+    def _may_sign(self, actor: str, now: Seconds) -> bool:
+        return now >= self._invited(actor) and self.scene.head_on == actor

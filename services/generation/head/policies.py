@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from engage_hri.services.generation.head.aversion_policy import AversionPolicy
+from engage_hri.services.generation.head.continuer_policy import ContinuerPolicy
 from engage_hri.services.generation.head.listening_policy import ListeningPolicy
 from engage_hri.services.generation.head.maintenance_policy import FaceWatch, GlanceWatch, HandWatch
 from engage_hri.services.generation.head.mutual_policy import MutualGazePolicy
@@ -21,6 +22,7 @@ OWN: Mapping[str, type[HeadPolicy]] = {
     "listening": ListeningPolicy,
     "hands": HandWatch,
     "face": FaceWatch,
+    "continuers": ContinuerPolicy,
     "nods": NodPolicy,
 }
 ORDERS = "inhibition", "fragment"

@@ -12,12 +12,19 @@ counted from the order. Thesis 3.3.4 has six of them.
 """
 
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from engage_hri.schemas.fragments import Claim
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.head.scene import HeadScene, Observation
+
+
+class RobotSign(NamedTuple):
+    """A sign of a listener: a nod, on top of the gaze. person: id of whom it is for. words: said with it, if any."""
+
+    person: str
+    words: str = ""
 
 
 class HeadPolicy:
@@ -51,12 +58,13 @@ class HeadPolicy:
         """
         return None
 
-    def nods(self, now: Seconds) -> str:
-        """Tell to whom the robot is to nod now, on top of its gaze: id of a person; "": to nobody.
+    def sign(self, now: Seconds) -> RobotSign | None:
+        """Return the sign that the robot is to give now, as a listener; None: it gives none.
 
-        It is asked after the ruling, and not while somebody's order holds the head. now: in seconds.
+        It is asked after the ruling, and neither while somebody's order holds the head nor in a turn of the robot.
+        now: in seconds.
         """
-        return ""
+        return None
 
     def has_head(self, has: bool, now: Seconds) -> None:
         """Note after each ruling who has the head.

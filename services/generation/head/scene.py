@@ -103,10 +103,14 @@ class HeadScene:
         """Id of the person spoken to last, or who has answered last."""
         self.waits = False
         """True if the robot's last turn is over, and no other has begun."""
+        self.has_turn = False
+        """True while a turn of the robot goes on, pauses included, or is to begin."""
         self.to_robot: tuple[str, ...] = ()
         """Those of whom it is known that they speak to the robot now, if a policy cares for that."""
         self.listens_to = ""
         """Who is heard, and may speak to the robot: to whom is known late, of short speeches when they are over."""
+        self.signed: dict[str, Seconds] = {}
+        """When each has been given the last sign of a listener."""
         self.words = 0.0
         """Number of words of the robot's fragment that was sent last."""
         self.owner = NOBODY
@@ -136,6 +140,7 @@ class HeadScene:
     def join(self, other: str, name: str) -> None:
         """Take two ids for one person, who is called `name` from now on."""
         self.sight.join(other, name)
+        self.signed.pop(other, None)
         self.partner = name if self.partner == other else self.partner
 
     @property

@@ -1,7 +1,7 @@
 """The policy of the next speaker: to whom of several the robot gives the turn. Pure.
 
 Who ends a turn to several people chooses by a name, or by a look, who is to speak next, if anybody is chosen (Sacks,
-Schegloff and Jefferson 1974). So the one named in the robot's last sentence gets the look at the end of the turn. If
+Schegloff and Jefferson 1974). So the one called in the robot's last sentence gets the look at the end of the turn. If
 nobody is named it is the one who has been silent for longest: a robot whose eyes seek the least active person evens
 out who takes part (Gillet et al. 2021), and one that looks at the same person after each question does the opposite.
 """
@@ -19,6 +19,7 @@ from engage_hri.schemas.world import World
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.turns.plan import TurnPlan
 from engage_hri.services.generation.turns.policy import News, TurnPolicy, TurnScene
+from engage_hri.services.text.calling import called
 
 _SENTENCE_END = re.compile(r"(?<=[.!?…。！？])\s*(?=\S)")
 
@@ -48,7 +49,11 @@ class NextSpeakerPolicy(TurnPolicy):
         if not plan.closes or not plan.others:
             return plan
         last = next((each.text for each in reversed(fragment.behaviors) if isinstance(each, Speech)), "")
-        words = re.findall(r"\w+", _SENTENCE_END.split(last.strip())[-1].casefold())
-        named = [who for who in plan.addressees if self._names.get(who, who).casefold() in words]
-        first = min(named or plan.addressees, key=lambda who: self._spoke.get(who, float("-inf")))
+        names = {self._names.get(who, who).casefold(): who for who in plan.addressees}
+        found = called(_SENTENCE_END.split(last.strip())[-1], names)
+        named = [who for who in plan.addressees if who in found] or plan.addressees
+        first = min(
+            [who for who in plan.addressees if who in named] or plan.addressees,
+            key=lambda who: self._spoke.get(who, float("-inf")),
+        )
         return replace(plan, addressee=first, others=tuple(who for who in plan.addressees if who != first))

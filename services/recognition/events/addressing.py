@@ -22,7 +22,6 @@ Before all of them: a sound that is over, and of which no words have come where 
 It is a cough, or a laugh at what a neighbor says.
 """
 
-import re
 from collections.abc import Iterable, Mapping
 from math import inf
 
@@ -31,7 +30,7 @@ from msgspec import Struct, field
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.recognition.events.limits import ROUNDING
 from engage_hri.services.recognition.events.listener_sign import SignPart
-from engage_hri.services.text.listening import greeting_before, without_honorific
+from engage_hri.services.text.calling import called
 
 LONGEST_UNKNOWN: Seconds = 3.0
 """Time after which a sound that still goes on is speech, and it is decided by the looks so far to whom. Ours."""
@@ -41,13 +40,6 @@ whom they are, if it ever has; and they may call somebody by name. Ours."""
 LONGEST_UNTOLD: Seconds = 15.0
 """As `LONGEST_UNKNOWN`, where perception tells addressees: it may do so only with the words, when the speech is over.
 A question of the robot waits so long, at most, until it is known that what somebody else says is no answer. Ours."""
-SHORT_CALL = 3
-"""Number of words up to which a name at the end calls somebody. Ours."""
-MARKS = ".,!?;:…¡¿\"'“”„‘’«»、，。！？"
-"""Punctuation that may stand beside a name."""
-COMMAS = (",", "、", "，")
-WORDS = re.compile(r"[^\s、，。！？]+[、，。！？]*|[、，。！？]+")
-"""Words with their punctuation. After that of Japanese and Chinese no blank comes."""
 Addressees = frozenset[str]
 NOBODY: Addressees = frozenset()
 WHOEVER: Addressees = frozenset(("",))
@@ -147,46 +139,11 @@ class OwnSpeech(Spoken, kw_only=True):
     """True if it began while the robot said something to others."""
 
 
-def named(words: str, names: Mapping[str, str]) -> Addressees:
-    """People and robots who are called by the words. names: actor ids by the names by which people call them.
-
-    A name calls somebody if it stands first, maybe after a greeting, last after a comma, or last of a few words: "hey
-    Ann, look", "hello robot". In the middle, and at the end of a sentence, it may be what the sentence is about.
-    """
-    said = [word for word in WORDS.findall(words) if any(map(str.isalnum, word))]
-    if not said:
-        return NOBODY
-    lengths = range(1 + max((name.count(" ") for name in names), default=0), 0, -1)
-    after = greeting_before([_plain([word]) for word in said])
-    begun = [(begin, length) for begin in dict.fromkeys((0, after)) for length in lengths]
-    calls = [(begin, begin + length) for begin, length in begun if _called(said[begin : begin + length], names)][:1]
-    after = calls[0][1] if calls else max(1, after)
-    calls += [
-        (len(said) - length, len(said))
-        for length in lengths
-        if after + length <= len(said)
-        and (len(said) - length < SHORT_CALL or said[-length - 1].endswith(COMMAS))
-        and _called(said[-length:], names)
-    ][:1]
-    return frozenset(_called(said[begin:end], names) for begin, end in calls)
-
-
-def _called(words: list[str], names: Mapping[str, str]) -> str:
-    """Actor id of the one of whom these words are the name, maybe with an honorific; "": they are none."""
-    name = _plain(words)
-    return names.get(name) or names.get(without_honorific(name), "")
-
-
-def _plain(words: list[str]) -> str:
-    """Words as in a name."""
-    return " ".join(words).strip(MARKS).casefold()
-
-
 def certain(speech: OwnSpeech, robot: str, names: Mapping[str, str], *, is_line: bool) -> Addressees | None:
     """Addressees by rules 1 to 3; None if these do not say. is_line: it was typed, which one does to the robot."""
     if speech.told is not None:
         return speech.told
-    if found := named(speech.words, names) - {speech.actor}:
+    if found := called(speech.words, names) - {speech.actor}:
         return found
     return None if speech.company and not is_line else frozenset((robot,))
 

@@ -158,14 +158,14 @@ class Dialogue:
 
     # -- the robot ----------------------------------------------------------------------------------------------
 
-    def robot_speaks(self, at: Seconds, *, listens: bool) -> None:
-        """Take the beginning of the robot's speech. listens: it is a backchannel that was announced."""
+    def robot_speaks(self, at: Seconds) -> None:
+        """Take the beginning of the robot's speech, which is no backchannel that was announced."""
         self.robot_speaks_since = at
         self.exchange.pair.robot_heard(None)
         if self._speech is not None and not self.exchange.pair.robot_holds_turn:
             if self.robot_backchannel.state != BRIEF and not self.exchange.pair.is_cut_into:
                 self.robot_backchannel.speaks(self._robots_backchannel(at))
-        elif not listens:
+        else:
             self.exchange.pair.robot_begins("speak", at)
             self.exchange.pair.forget_unanswered()
 
@@ -181,7 +181,7 @@ class Dialogue:
         self._floor_is_free(at)
 
     def robot_gestures(self, action: Action, at: Seconds, *, listens: bool) -> None:
-        """Take a nod, a shake or a point of the robot. listens: it is a backchannel that was announced."""
+        """Take a nod, a shake, a point or an "uh-huh" of the robot. listens: it is an announced backchannel."""
         if self._speech is None or action == "point":
             if not listens:
                 self.exchange.pair.robot_begins(action, at)

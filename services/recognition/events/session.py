@@ -264,14 +264,13 @@ class Session:
             return
         self._robot_actions[began.behavior, began.action] = began
         listens = self.scene.is_listening(began.behavior)
-        match began.action:
-            case "speak":
-                self._heard_at = None
-                if self.scene.robot_speaks_since is None:
-                    self._robot_speaks(began, at)
-                    self._say(began, at, lambda talk: talk.robot_speaks(at, listens=listens))
-            case "nod" | "shake" | "point":
-                self._say(began, at, lambda talk: talk.robot_gestures(began.action, at, listens=listens))
+        self._heard_at = None if began.action == "speak" else self._heard_at
+        # A listener's word is a sign and no speech: it has no floor, answers nobody, and nobody speaks into it.
+        if began.action in ("nod", "shake", "point") or (listens and began.action == "speak"):
+            self._say(began, at, lambda talk: talk.robot_gestures(began.action, at, listens=listens))
+        elif began.action == "speak" and self.scene.robot_speaks_since is None:
+            self._robot_speaks(began, at)
+            self._say(began, at, lambda talk: talk.robot_speaks(at))
         part = PARTS.get(began.action, "rest")
         self._people.apply_to_all(at, lambda person: person.tell(lambda kind: kind.robot_begins(began, at)), part)
 
@@ -280,14 +279,11 @@ class Session:
         self.scene.robot_spoken = Spoken(actor=self.robot, since=at, to=self.addressees_of(began.behavior) or WHOEVER)
         self.scene.note_spoken(self.scene.robot_spoken, at)
 
-    def _say(self, began: ActionBegan, at: Seconds, step: Step) -> None:
+    def _say(self, action: ActionBegan | ActionEnded, at: Seconds, step: Step) -> None:
         """Tell what the robot says or shows to those to whom it is; to all if that is not known."""
-        to = self.addressees_of(began.behavior)
-        if to is None:
-            self._tell("", at, step)
-        else:
-            for actor in sorted(to):
-                self._tell(actor, at, step)
+        to = self.addressees_of(action.behavior)
+        for actor in ("",) if to is None else sorted(to):
+            self._tell(actor, at, step)
 
     def addressees_of(self, behavior: str) -> Addressees | None:
         """Addressees of a behavior of the robot, `block:behavior`; None: they are not known."""
@@ -317,6 +313,8 @@ class Session:
             self._robot_looks(began.targets, max(since, self.scene.gaze.since))
             return
         self._robot_actions[began.behavior, began.action] = began
+        if self.scene.is_listening(began.behavior):
+            return
         if began.action == "speak" and self.scene.robot_speaks_since is None:
             self._heard_at = None
             self._robot_speaks(began, since)
@@ -332,7 +330,10 @@ class Session:
             self._note_robot_gaze()
             return
         if action == "speak":
-            if self.scene.robot_speaks_since is None or any(each == "speak" for _, each in self._robot_actions):
+            if self.scene.robot_speaks_since is None:
+                self._say(ended, at, lambda talk: talk.robot_gesture_ends("speak", at))
+                return
+            if any(each == "speak" for _, each in self._robot_actions):
                 return
             self.scene.robot_falls_silent(at)
         self._people.apply_to_all(
@@ -497,7 +498,7 @@ class Session:
         if speaks and actor and said is not None and said.to is not None and not said.is_to(actor):
             said.to |= {actor}
             self.scene.floor_changes += 1
-            self._tell(actor, at, lambda talk: talk.robot_speaks(max(said.since, at), listens=False))
+            self._tell(actor, at, lambda talk: talk.robot_speaks(max(said.since, at)))
 
     def _opens(self, turn: str, addressee: str) -> None:
         """Note a turn of the robot that goes on over several blocks."""
