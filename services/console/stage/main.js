@@ -82,7 +82,7 @@ function tell() {
   const { talk, scene, person } = state;
   const present = scene?.people.filter((each) => each.at && each.present && each.id !== person) ?? [];
   bar.take({
-    person, denied: state.denied, ready: talk?.state === "ready" && !state.link && Boolean(scene?.body), company: present.map(({ id }) => id),
+    person, denied: state.denied, linked: !state.link, ready: talk?.state === "ready" && !state.link && Boolean(scene?.body), company: present.map(({ id }) => id),
     part: part(talk, scene, person), speaks: isTalking(), hears: talk?.hears, sees: talk?.sees,
   });
   document.body.classList.toggle("seated", Boolean(person));
