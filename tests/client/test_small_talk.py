@@ -16,10 +16,12 @@ from engage_hri.services.commandline.embedding import EmbeddedRobot
 from engage_hri.services.commandline.look.small_talk import (
     EXAMPLES,
     OTHERWISE,
+    PHRASES,
     PIECES,
     RULES,
     SEVERAL,
     SILENCE,
+    STILL,
     answer,
     talk,
 )
@@ -182,6 +184,22 @@ async def test_what_it_does_not_know_it_says_and_names_another_example_each_time
     before, after = spoken(OTHERWISE).split("{example}")
     named = [turn.removeprefix(before).removesuffix(after) for turn in going.turns[2:]]
     assert (len({*named}), {*named} - {*EXAMPLES}) == (2, set())
+
+
+async def test_who_says_stop_into_its_words_is_answered_by_a_nod_and_the_rest_is_left() -> None:
+    async with talking() as going, perceive("ann", hub=going.robot.hub) as ann:
+        await ann.look_at(ann.robot)
+        await asyncio.sleep(6)
+        await ann.say("What can you do?")
+        await asyncio.sleep(2.5)
+        await ann.say("Stop!")
+        await asyncio.sleep(6)
+
+    assert going.turns[2].startswith("I listen, I look, and I point")
+    assert "or: " not in going.turns[2]
+    assert going.turns[3:] == [""]
+    assert {answer(each) for each in STILL} == {"[nod]"}
+    assert {*STILL} <= {*PHRASES}
 
 
 def test_it_understands_what_most_answer_to_its_greeting() -> None:

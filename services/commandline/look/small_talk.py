@@ -60,8 +60,9 @@ PIECES = (
 
 The white one is a trapezoid: the dictionary of `sphinx` has no such word."""
 SEVERAL = "There are several of these. Say colour and shape, as in: where is the blue square."
-WORDLESS = r"(ha ?h?)+|(please )?(stop|wait|be quiet)( please)?"
-"""What a nod answers: laughter, and what somebody says for the robot to be still."""
+STILL = ("stop", "please stop", "stop please", "wait", "please wait", "be quiet", "please be quiet")
+"""What somebody says for the robot to be still. A nod answers it, as it does laughter."""
+WORDLESS = "|".join(("(ha ?h?)+", *STILL))
 OTHERWISE = "[shake] I did not understand that. Say, for example: {example}."
 SILENCE = (
     # seconds in which somebody has said nothing, and what the robot says then; the first one greets
@@ -73,6 +74,7 @@ SILENCE = (
 WORDS = 10.0
 """Seconds for which the robot waits for words of somebody whose voice it hears."""
 PHRASES = (
+    *STILL,
     *(phrase for phrases in RULES for phrase in phrases),
     *(f"where is the {piece}" for piece in PIECES if piece != "blue square"),
 )
