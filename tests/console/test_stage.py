@@ -279,6 +279,10 @@ async def test_a_visitor_sees_words_in_their_language_and_changes_it_at_one_touc
             ["Say something in German", ["Yes", "Ja."], "It speaks German."],
             ["Sag etwas", ["Ja", "Ja."], "Der Roboter schaut zurück."],
         ]
+        named = """import('./stage/words.js').then(({ texts }) => ["en", "de"].map((name) => texts(name, "en"))
+          .map(({ thing }) => thing("%s")))"""
+        assert await page.value(named % "blue square") == ["blue square", "blaues Quadrat"]
+        assert await page.value(named % "cup") == ["cup", "cup"]
 
 
 @needs_browser

@@ -178,7 +178,10 @@ function hint(now) {
   if (!person) return "";
   if (isTalking()) return text.talks;
   if (bar.points) return text.pointing;
-  const named = (id) => state.scene.things.find((each) => each.id === id)?.label ?? text.called(id);
+  const named = (id) => {
+    const thing = state.scene.things.find((each) => each.id === id);
+    return thing ? text.thing(thing.label) : text.called(id);
+  };
   const met = moment(talk, state.scene.robot, person);
   const next = visit(now - idle, { seated: true, kiosk: isKiosk, touched });
   const tips = text.tips(bar.ear, bar.eye);
