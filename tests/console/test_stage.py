@@ -345,8 +345,9 @@ async def test_what_becomes_of_who_does_nothing_and_what_a_visitor_is_told_first
     idle = "import('./stage/visit.js').then(({ visit }) => [5, 13, 25, 46, 61].map((idle) => visit(idle, %s).do))"
     seen = "import('./stage/visit.js').then(({ moment }) => moment(%s, 'robot', 'ann')?.text ?? '')"
 
-    def talk(voices: Any = (), *bonds: dict[str, Any]) -> str:
-        return json.dumps({"voices": voices, "bonds": bonds})
+    def talk(voices: Any = (), *bonds: dict[str, Any], speaker: str = "") -> str:
+        bubbles = [{"actor": each, "open": each == speaker} for each in ("robot", "ann")]
+        return json.dumps({"voices": voices, "bonds": bonds, "bubbles": bubbles})
 
     def bond(kind: str, met: bool = False, by: str = "robot", to: str = "ann") -> dict[str, Any]:
         return {"kind": kind, "met": met, "by": by, "to": to, "about": ["cup"]}
@@ -365,6 +366,7 @@ async def test_what_becomes_of_who_does_nothing_and_what_a_visitor_is_told_first
             talk((), look, pair): "looking", talk((), eyes): "meet", talk((), {**eyes, "met": True}): "mutual",
             talk([{"actor": "robot", "to": ["ben"]}], eyes): "elsewhere", talk([{"actor": "ben", "to": []}]): "",
             talk((), {**pair, "to": "ben"}): "", talk((), {**pair, "met": True}): "",
+            talk((), pair, speaker="robot"): "listen", talk((), pair, speaker="ann"): "looking",
         }  # fmt: skip
         assert {case: await page.value(seen % case) for case in cases} == cases
 
