@@ -91,7 +91,7 @@ def test_it_says_plainly_what_to_install(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(talk, "_has", lambda package: True)
     monkeypatch.setattr(talk, "has_hearing", lambda: True)
     assert [*talk._lacks(config)] == [
-        "voices are heard, and no words: --set hearing.recognizer=NAME, of docs/hearing.md"
+        "voices are heard, and no words, which people type: --set hearing.recognizer=NAME, of docs/hearing.md"
     ]
 
 
@@ -102,6 +102,7 @@ def test_it_says_plainly_what_to_install(monkeypatch: pytest.MonkeyPatch) -> Non
         (("--voice", "nosuch"), "no voice 'nosuch'"),
         (("--set", "hearing.recognizer=nosuch"), "no recognizer 'nosuch'"),
         (("--set", "hearing.language=de", "--set", "hearing.recognizer=sphinx"), "English alone"),
+        (("--set", "hearing.language=fr"), "no rules that come with it are in 'fr', only in en, de"),
     ],
 )
 def test_what_cannot_be_is_refused_before_an_address_is_told(
@@ -122,6 +123,16 @@ def test_a_kiosk_has_a_window_also_beside_a_microphone_of_its_own(engage: Engage
 
     refused = engage("talk", "--kiosk", "--no-window")
     assert (refused.code, "the seat is in the window" in refused.err) == (2, True)
+
+
+def test_a_german_talk_has_german_rules_and_voice_and_no_recognizer_of_english(tmp_path: Path) -> None:
+    ours = talk.read_manager(None, "de")
+    settings = {*talk._defaults(ours, True, "de")}
+
+    assert "wo ist das rosa Dreieck" in ours.examples
+    assert talk.read_manager(tmp_path / "mine.py", "de").phrases == ours.phrases
+    assert ("control.drivers.espeak.language=de" in settings) == ("control.voice=espeak" in settings)
+    assert not any(each.startswith("hearing.recognizer") for each in settings)
 
 
 @pytest.mark.real_time

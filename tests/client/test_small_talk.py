@@ -2,30 +2,37 @@
 
 import asyncio
 import re
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from engage_hri import embedded, perceive
+from engage_hri import Robot, embedded, perceive
 from engage_hri.schemas import keys
 from engage_hri.schemas.perception import ActionBegan
 from engage_hri.services.commandline.embedding import EmbeddedRobot
+from engage_hri.services.commandline.look import small_talk_de as german
 from engage_hri.services.commandline.look.small_talk import (
     EXAMPLES,
     OTHERWISE,
+    PHRASES,
     PIECES,
     RULES,
     SEVERAL,
     SILENCE,
-    answer,
+    STILL,
+    SmallTalk,
     talk,
 )
-from engage_hri.services.commandline.look.talk import RULES as RULES_FILE
+from engage_hri.services.commandline.look.talk import RULES as RULES_FILES
+from engage_hri.services.tangram.table import tangram_table
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "talk.md").read_text(encoding="utf-8")
+
+
+answer = SmallTalk().answer
 
 
 def spoken(text: str) -> str:
@@ -47,10 +54,10 @@ class Talk:
 
 
 @asynccontextmanager
-async def talking() -> AsyncIterator[Talk]:
+async def talking(manager: Callable[[Robot], Coroutine[Any, Any, None]] = talk) -> AsyncIterator[Talk]:
     async with embedded(human="none") as robot:
         going = Talk(robot)
-        tasks = [asyncio.create_task(going.note()), asyncio.create_task(talk(robot))]
+        tasks = [asyncio.create_task(going.note()), asyncio.create_task(manager(robot))]
         try:
             yield going
         finally:
@@ -184,6 +191,63 @@ async def test_what_it_does_not_know_it_says_and_names_another_example_each_time
     assert (len({*named}), {*named} - {*EXAMPLES}) == (2, set())
 
 
+async def test_who_says_stop_into_its_words_is_answered_by_a_nod_and_the_rest_is_left() -> None:
+    async with talking() as going, perceive("ann", hub=going.robot.hub) as ann:
+        await ann.look_at(ann.robot)
+        await asyncio.sleep(6)
+        await ann.say("What can you do?")
+        await asyncio.sleep(2.5)
+        await ann.say("Stop!")
+        await asyncio.sleep(6)
+
+    assert going.turns[2].startswith("I listen, I look, and I point")
+    assert "or: " not in going.turns[2]
+    assert going.turns[3:] == [""]
+    assert {answer(each) for each in STILL} == {"[nod]"}
+    assert {*STILL} <= {*PHRASES}
+
+
+async def test_in_german_it_greets_answers_shows_pieces_by_their_names_and_says_goodbye() -> None:
+    async with talking(german.talk) as going, perceive("ann", hub=going.robot.hub) as ann:
+        await ann.look_at(ann.robot)
+        await asyncio.sleep(6)
+        for words in (
+            "Mir geht es gut.",
+            "Wo ist das rosa Dreieck?",
+            "Zeig mir die Dreiecke!",
+            "Wie heisst du?",
+            "Magst du das Meer?",
+        ):
+            await ann.say(words)
+            await asyncio.sleep(9)
+        await ann.say("Tschüss!")
+        await asyncio.sleep(90)
+
+    *told, unknown, last = going.turns
+    assert told == [
+        "Hallo! Schön, dass du da bist.", "Wie geht es dir?", "Das freut mich.", "Da ist das rosa Dreieck",
+        "Davon gibt es mehrere. Sag Farbe und Form, so wie: wo ist das blaue Quadrat.",
+        "Ich bin ein Roboter, und einen Namen habe ich noch nicht.",
+    ]  # fmt: skip
+    assert unknown.startswith("Das habe ich nicht verstanden. Sag zum Beispiel: ")
+    assert last == "Auf Wiedersehen! Es war schön, mit dir zu reden."
+
+
+def test_the_german_rules_know_what_they_name_and_as_much_as_the_english_ones() -> None:
+    talks = SmallTalk(german.RULES, german.EXAMPLES, german.STILL, otherwise="?", shows="{thing}", names=german.NAMES)
+    things = tangram_table().figure()
+
+    assert {*german.NAMES} == {each.id for each in things}
+    assert {talks.answer(f"Zeig mir {name}, bitte!", things) for name in german.NAMES.values()} >= {
+        each.id for each in things if each.id not in ("blue-square", "red-square")
+    }
+    assert [each for each in german.EXAMPLES if talks.answer(each, things) == "?"] == []
+    assert {talks.answer(each) for each in german.STILL} == {"[nod]"}
+    assert len(german.RULES) == len(RULES)
+    for phrases, text in german.RULES.items():
+        assert [each for each in phrases if talks.answer(each.upper()) != text] == []
+
+
 def test_it_understands_what_most_answer_to_its_greeting() -> None:
     assert {answer(words) for words in ("Fine, thanks! And you?", "I am good.", "Fine, thank you.")} == {
         answer("I am fine.")
@@ -206,5 +270,5 @@ async def test_the_manager_that_the_page_shows_asks_and_hears(capsys: pytest.Cap
 
 def test_the_table_that_the_page_shows_is_that_of_the_file() -> None:
     [table] = re.findall(r"^```text\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
-    lines = RULES_FILE.read_text(encoding="utf-8").splitlines()
+    lines = RULES_FILES["en"].read_text(encoding="utf-8").splitlines()
     assert [line for line in table.splitlines() if line not in lines] == []

@@ -116,12 +116,15 @@ class Browser:
         self._port = port
 
     @asynccontextmanager
-    async def page(self) -> AsyncIterator[Page]:
-        """An empty page in a window of its own, while the body of `async with` runs: hidden tabs draw nothing."""
+    async def page(self, *, tab: bool = False) -> AsyncIterator[Page]:
+        """An empty page in a window of its own, while the body of `async with` runs: hidden tabs draw nothing.
+
+        tab: in the window of the page that was made last, which is hidden from then on, as by a hand.
+        """
         async with self._session.get(f"http://127.0.0.1:{self._port}/json/version") as answer:
             whole = (await answer.json())["webSocketDebuggerUrl"]
         async with self._session.ws_connect(whole) as socket:
-            asked = {"url": "about:blank", "newWindow": True}
+            asked = {"url": "about:blank", "newWindow": not tab}
             await socket.send_json({"id": 1, "method": "Target.createTarget", "params": asked})
             target = (await socket.receive_json(timeout=30))["result"]["targetId"]
         place = f"http://127.0.0.1:{self._port}/devtools/page/{target}"

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import aiohttp
 import numpy as np
 
-from engage_hri.services.commandline.look.small_talk import EXAMPLES, answer
+from engage_hri.services.commandline.look.small_talk import EXAMPLES, SmallTalk
 from engage_hri.services.perception.hearing.recognizers.sphinx import Sphinx
 from engage_hri.services.perception.hearing.recognizing import RecognizerSettings
 from engage_hri.services.perception.hearing.sound import resampled
@@ -82,7 +82,7 @@ def plain(text: str) -> str:
 
 def spoken_answer(phrase: str) -> str:
     """The answer to a phrase, as plain words."""
-    return plain(re.sub(r"\[(.*?)\]", lambda told: CALLED.get(told[1], ""), answer(phrase, THINGS)))
+    return plain(re.sub(r"\[(.*?)\]", lambda told: CALLED.get(told[1], ""), SmallTalk().answer(phrase, THINGS)))
 
 
 def places(phrases: tuple[str, ...]) -> list[float]:

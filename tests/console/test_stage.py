@@ -279,6 +279,10 @@ async def test_a_visitor_sees_words_in_their_language_and_changes_it_at_one_touc
             ["Say something in German", ["Yes", "Ja."], "It speaks German."],
             ["Sag etwas", ["Ja", "Ja."], "Der Roboter schaut zurück."],
         ]
+        named = """import('./stage/words.js').then(({ texts }) => ["en", "de"].map((name) => texts(name, "en"))
+          .map(({ thing }) => thing("%s")))"""
+        assert await page.value(named % "blue square") == ["blue square", "blaues Quadrat"]
+        assert await page.value(named % "cup") == ["cup", "cup"]
 
 
 @needs_browser
@@ -341,8 +345,9 @@ async def test_what_becomes_of_who_does_nothing_and_what_a_visitor_is_told_first
     idle = "import('./stage/visit.js').then(({ visit }) => [5, 13, 25, 46, 61].map((idle) => visit(idle, %s).do))"
     seen = "import('./stage/visit.js').then(({ moment }) => moment(%s, 'robot', 'ann')?.text ?? '')"
 
-    def talk(voices: Any = (), *bonds: dict[str, Any]) -> str:
-        return json.dumps({"voices": voices, "bonds": bonds})
+    def talk(voices: Any = (), *bonds: dict[str, Any], speaker: str = "") -> str:
+        bubbles = [{"actor": each, "open": each == speaker} for each in ("robot", "ann")]
+        return json.dumps({"voices": voices, "bonds": bonds, "bubbles": bubbles})
 
     def bond(kind: str, met: bool = False, by: str = "robot", to: str = "ann") -> dict[str, Any]:
         return {"kind": kind, "met": met, "by": by, "to": to, "about": ["cup"]}
@@ -361,6 +366,7 @@ async def test_what_becomes_of_who_does_nothing_and_what_a_visitor_is_told_first
             talk((), look, pair): "looking", talk((), eyes): "meet", talk((), {**eyes, "met": True}): "mutual",
             talk([{"actor": "robot", "to": ["ben"]}], eyes): "elsewhere", talk([{"actor": "ben", "to": []}]): "",
             talk((), {**pair, "to": "ben"}): "", talk((), {**pair, "met": True}): "",
+            talk((), pair, speaker="robot"): "listen", talk((), pair, speaker="ann"): "looking",
         }  # fmt: skip
         assert {case: await page.value(seen % case) for case in cases} == cases
 

@@ -158,26 +158,55 @@ async def test_the_camera_is_offered_where_the_robot_sees_and_says_why_there_is_
         assert await page.value(f"{button}.getAttribute('aria-pressed')") == "false"
 
 
+BLIND = """void (navigator.mediaDevices.getUserMedia = async () => {
+  window.asked = (window.asked ?? 0) + 1;
+  const made = document.createElement('canvas');
+  made.getContext('2d');
+  return made.captureStream(5);
+}, window.Worker = class {
+  postMessage({ place }) {
+    const { ends } = window;
+    if (place && ends !== null) setTimeout(() => this.onmessage({ data: { ended: ends } }));
+  }
+  addEventListener() {}
+  terminate() {}
+})"""
+"""Let the camera of a page show nothing, and its link end with the words in `ends`, if these are not null."""
+
+
 @needs_browser
 async def test_nobody_is_told_to_press_a_camera_that_ended_by_itself(place: Place) -> None:
     hint = "document.querySelector('.hint').textContent"
-    blind = """void (navigator.mediaDevices.getUserMedia = async () => {
-      const made = document.createElement('canvas');
-      made.getContext('2d');
-      return made.captureStream(5);
-    }, window.Worker = class {
-      postMessage() { setTimeout(() => this.onmessage({ data: { ended: 'models' } })); }
-      addEventListener() {}
-      terminate() {}
-    })"""
     async with await open_hub("robot", connect=(place.endpoint,)) as hub, opened(place) as page:
         hub.join("eyes", "perception").declare_alive()
         await page.until("window.stage.state.talk.sees")
         await sit(page)
         await page.until(f"{hint} === 'Press the camera, and the robot sees where you look.'")
-        await page.value(blind)
+        await page.value(f"void (window.ends = 'models'); {BLIND}")
         await press(page, ".see")
         await page.until(f"{hint}.includes('not installed')")
         await page.value(LATER % 13_000)
         await page.until(f"!{hint}.includes('not installed')")
         assert await page.value(hint) == "Touch a piece to look at it."
+
+        await page.value("window.stage.send({ do: 'leave' });0")  # who sits down next may have another
+        await page.until(f"!{PERSON}")
+        await sit(page)
+        await page.until(f"{hint} === 'Press the camera, and the robot sees where you look.'")
+
+
+@needs_browser
+async def test_a_device_whose_link_was_away_for_long_is_on_again_by_itself_once_the_window_answers(
+    place: Place,
+) -> None:
+    light = "document.querySelector('.see.light')"
+    async with await open_hub("robot", connect=(place.endpoint,)) as hub, opened(place) as page:
+        hub.join("eyes", "perception").declare_alive()
+        await page.until("window.stage.state.talk.sees")
+        await sit(page)
+        await page.value(f"void (window.ends = ''); {BLIND}")
+        await press(page, ".see")
+        await page.until("window.asked === 1")
+        await page.value("void (window.ends = null)")
+        await press(page, ".quick:nth-of-type(2)")  # a frame comes
+        await page.until(f"window.asked === 2 && {light}")

@@ -12,7 +12,7 @@ import pytest
 from tests.console import browser
 from tests.console.browser import Page, waited
 from tests.console.tapped import press, tap
-from tests.console.test_stage import OUTSIDE, PERSON, PHONE, SCROLLS, TOO_SMALL, shows
+from tests.console.test_stage import LATER, OUTSIDE, PERSON, PHONE, SCROLLS, TOO_SMALL, shows
 from tests.console.windows import engage, hears
 
 pytest.importorskip("espeakng_loader", reason="needs the extra `voice`")
@@ -141,6 +141,21 @@ async def test_why_there_is_no_microphone_is_told_in_words(
         await page.until(f"{HINT}.includes({words!r})", 2.0)
         assert not await page.value(f"Boolean({LIGHT})")
         await fits(page)
+
+
+async def test_who_comes_back_to_a_page_that_was_hidden_is_told_why_they_are_not_heard(place: Talking) -> None:
+    async with browser.at_port(place.port) as running, seated(place) as page:
+        await press(page, ".hold")
+        await page.until(LIGHT, 20)
+        async with running.page(tab=True):
+            await page.until(f"document.hidden && !{LIGHT}")
+            await page.value(LATER % 60_000)
+        await page.call("Page.bringToFront")
+        await page.until(f"{HINT}.includes('went off as this page was hidden')", 5.0)
+        await page.value(LATER % 13_000)
+        await page.until(f"!{HINT}.includes('went off')")
+        await press(page, ".hold")
+        await page.until(LIGHT, 20)
 
 
 async def test_axe_finds_nothing_to_complain_of_while_one_is_heard(place: Talking) -> None:

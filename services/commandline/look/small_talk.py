@@ -6,9 +6,9 @@ runs that one. It also runs by itself, beside a robot that runs already: `python
 
 import asyncio
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from itertools import cycle, islice
-from typing import Literal
+from typing import Any, Literal
 
 from engage_hri import EngageError, Entity, Robot, connect
 
@@ -51,7 +51,6 @@ EXAMPLES = (
     "what is on the table", "where is the white piece", "what is your name",
 )  # fmt: skip
 """What somebody may say. The robot names one of them as {example}, three as {examples}, and others next time."""
-NEXT = cycle(EXAMPLES)
 PIECES = (
     "orange rectangle", "white piece", "blue square", "green square", "purple square", "red square",
     "pink square", "yellow triangle", "pink triangle", "purple triangle",
@@ -60,8 +59,8 @@ PIECES = (
 
 The white one is a trapezoid: the dictionary of `sphinx` has no such word."""
 SEVERAL = "There are several of these. Say colour and shape, as in: where is the blue square."
-WORDLESS = r"(ha ?h?)+|(please )?(stop|wait|be quiet)( please)?"
-"""What a nod answers: laughter, and what somebody says for the robot to be still."""
+STILL = ("stop", "please stop", "stop please", "wait", "please wait", "be quiet", "please be quiet")
+"""What somebody says for the robot to be still. A nod answers it, as it does laughter."""
 OTHERWISE = "[shake] I did not understand that. Say, for example: {example}."
 SILENCE = (
     # seconds in which somebody has said nothing, and what the robot says then; the first one greets
@@ -73,115 +72,156 @@ SILENCE = (
 WORDS = 10.0
 """Seconds for which the robot waits for words of somebody whose voice it hears."""
 PHRASES = (
+    *STILL,
     *(phrase for phrases in RULES for phrase in phrases),
     *(f"where is the {piece}" for piece in PIECES if piece != "blue square"),
 )
 """What somebody may say: `engage talk` tells it to a recognizer that knows phrases alone."""
 
 
-async def talk(robot: Robot) -> None:
-    """Talk with all who are there, until cancelled."""
-    here: dict[str, asyncio.Task[None]] = {}
-    silences: dict[str, list[tuple[float, str]]] = {}
-    floor = asyncio.Lock()
-    async with asyncio.TaskGroup() as group:
-        with robot.worlds() as worlds:
-            async for world in worlds:
-                for person in {each.id for each in world.people} ^ here.keys():
-                    if person in here:
-                        here.pop(person).cancel()
-                        silences.pop(person, None)
-                    else:
-                        here[person] = group.create_task(talk_with(robot, person, floor, silences))
+class SmallTalk:
+    """The talk by such tables.
 
-
-async def talk_with(
-    robot: Robot, person: str, floor: asyncio.Lock, silences: dict[str, list[tuple[float, str]]]
-) -> None:
-    """Greet a person, if they do not speak first, and answer them.
-
-    floor: of the robot, which says one thing at a time. silences: what is left of `SILENCE` for each who is here: all
-    hear what the robot says to one of them.
+    shows: what the robot says of {thing}. names: words for each thing, by id, with an article; the robot finds its
+    own, in English, for those without. parting: says goodbye. last: words before the last of several.
     """
-    silences[person], heard_id, speaks = list(SILENCE), "", False
-    with robot.utterances() as utterances:
-        while True:
-            next_one = silences[person][0] if silences[person] else (None, "")
-            said = await utterances.next(WORDS if speaks else next_one[0])
-            if said is None and not speaks and next_one in silences[person]:
-                for each in [person] if next_one == SILENCE[0] else silences:
-                    silences[each] = [one for one in silences[each] if one != next_one]
-                async with floor:
-                    await say(robot, person, next_one[1], 3)
-            speaks = said is not None and said.actor == person and not said.final
-            if said is not None and said.actor == person and said.final and said.id != heard_id:
-                heard_id, text = said.id, answer(said.text, (await robot.world()).objects)
-                silences[person] = [] if text.startswith("Goodbye") else list(SILENCE[1:])
-                async with floor:
-                    await say(robot, person, text, 2)
+
+    def __init__(
+        self,
+        rules: Mapping[tuple[str, ...], str] = RULES,
+        examples: tuple[str, ...] = EXAMPLES,
+        still: tuple[str, ...] = STILL,
+        otherwise: str = OTHERWISE,
+        several: str = SEVERAL,
+        silence: tuple[tuple[float, str], ...] = SILENCE,
+        shows: str = "Look at [{thing}].",
+        names: Mapping[str, str] | None = None,
+        parting: str = "Goodbye!",
+        last: str = "or: ",
+    ) -> None:
+        self._texts = {phrase.casefold(): text for phrases, text in rules.items() for phrase in phrases}
+        self._next = cycle(examples)
+        self._wordless = "|".join(("(ha ?h?)+", *still))
+        self._otherwise, self._several, self._silence = otherwise, several, silence
+        self._shows, self._names, self._parting, self._last = shows, names or {}, parting, last
+
+    async def talk(self, robot: Robot) -> None:
+        """Talk with all who are there, until cancelled."""
+        here: dict[str, asyncio.Task[None]] = {}
+        silences: dict[str, list[tuple[float, str]]] = {}
+        floor = asyncio.Lock()
+        async with asyncio.TaskGroup() as group:
+            with robot.worlds() as worlds:
+                async for world in worlds:
+                    for person in {each.id for each in world.people} ^ here.keys():
+                        if person in here:
+                            here.pop(person).cancel()
+                            silences.pop(person, None)
+                        else:
+                            here[person] = group.create_task(self._talk_with(robot, person, floor, silences))
+
+    async def _talk_with(
+        self, robot: Robot, person: str, floor: asyncio.Lock, silences: dict[str, list[tuple[float, str]]]
+    ) -> None:
+        """Greet a person, if they do not speak first, and answer them.
+
+        floor: of the robot, which says one thing at a time. silences: what is left of `SILENCE` for each who is here:
+        all hear what the robot says to one of them.
+        """
+        greeting, *later = self._silence
+        silences[person], heard_id, speaks = [greeting, *later], "", False
+        with robot.utterances() as utterances:
+            while True:
+                next_one = silences[person][0] if silences[person] else (None, "")
+                said = await utterances.next(WORDS if speaks else next_one[0])
+                if said is None and not speaks and next_one in silences[person]:
+                    for each in [person] if next_one == greeting else silences:
+                        silences[each] = [one for one in silences[each] if one != next_one]
+                    async with floor:
+                        await self._say(robot, person, next_one[1], 3)
+                speaks = said is not None and said.actor == person and not said.final
+                if said is not None and said.actor == person and said.final and said.id != heard_id:
+                    heard_id, text = said.id, self.answer(said.text, (await robot.world()).objects)
+                    silences[person] = [] if self._parting in text else later
+                    async with floor:
+                        await self._say(robot, person, text, 2)
+
+    def answer(self, words: str, things: Iterable[Entity] = ()) -> str:
+        """Find what the robot says to words: by the longest phrase in them, or else by a thing that they name.
+
+        words: as they were understood, or typed. things: on the table.
+        """
+        plain = " ".join(re.findall(r"[\w']+", words.casefold()))
+        if re.fullmatch(self._wordless, plain):
+            return "[nod]"
+        found = max((each for each in self._texts if re.search(rf"\b{each}\b", plain)), key=len, default="")
+        if " " not in found and (text := self._shown({*plain.split()}, things)):
+            return text
+        return self._texts.get(found, self._otherwise)
+
+    def _shown(self, words: set[str], things: Iterable[Entity]) -> str:
+        """Find what the robot says to words for colour and shape. Empty: no thing has these."""
+        fits = {
+            thing.id: sum(any(is_form_of(word, own) for word in words) for own in self._words(thing))
+            for thing in things
+        }
+        best = [id for id, fit in fits.items() if fit == max(fits.values()) > 0]
+        return (self._several if len(best) > 1 else self._shows.format(thing=best[0])) if best else ""
+
+    def _words(self, thing: Entity) -> list[str]:
+        """Words for colour and shape of a thing."""
+        return self._names[thing.id].casefold().split()[1:] if thing.id in self._names else [thing.color, thing.shape]
+
+    async def _say(self, robot: Robot, person: str, text: str, turn_index: Literal[2, 3]) -> None:
+        """Say a text to a person. What it asks at its end opens an exchange.
+
+        turn_index: 2: it answers; 3: it comes by itself.
+        """
+        if "{examples}" in text:
+            *some, last = islice(self._next, 3)
+            text = text.format(examples=f"{', '.join(some)}, {self._last}{last}")
+        if "{example}" in text:
+            text = text.format(example=next(self._next))
+        match = re.fullmatch(r"(.*?[.!]?)\s*([^.!?]*\?)?", text)
+        told, asked = match.groups() if match else (text, None)
+        for words, index in ((told, turn_index), (asked, 1)):
+            if words:
+                await perform(robot, person, "full", self._parts_of(words), turn_index=index)
+
+    def _parts_of(self, text: str) -> list[dict[str, Any]]:
+        """Make the parts of a turn: words, and what stands in brackets."""
+        parts = [
+            self._part_of(each) if number % 2 else {"say": each}
+            for number, each in enumerate(re.split(r"\[(.*?)\]", text))
+        ]
+        return [each for each in parts if each.get("say", "words").strip(" .")]
+
+    def _part_of(self, bracket: str) -> dict[str, Any]:
+        """Make the part that a bracket means: `nod`, `shake`, `look` and a thing, or a thing to be shown."""
+        if bracket in ("nod", "shake"):
+            return {"gesture": bracket}
+        word, _, thing = bracket.partition(" ")
+        if word == "look":
+            return {"look": thing}
+        return {"refer": bracket, **({"phrases": (self._names[bracket],)} if bracket in self._names else {})}
 
 
-def answer(words: str, things: Iterable[Entity] = ()) -> str:
-    """Find what the robot says to words: by the longest phrase in them, or else by a thing that they name.
-
-    words: as they were understood, or typed. things: on the table.
-    """
-    plain = " ".join(re.findall(r"[\w']+", words.lower()))
-    if re.fullmatch(WORDLESS, plain):
-        return "[nod]"
-    texts = {phrase: text for phrases, text in RULES.items() for phrase in phrases}
-    found = max((each for each in texts if re.search(rf"\b{each}\b", plain)), key=len, default="")
-    if " " not in found and (text := shown({*plain.split()}, things)):
-        return text
-    return texts.get(found, OTHERWISE)
+def is_form_of(word: str, own: str) -> bool:
+    """True if a word is this one, with any ending, as `squares` and `blaues` have them. Both without capitals."""
+    return bool(own) and re.fullmatch(rf"{re.escape(own.removesuffix('e'))}e?[mnrs]?", word) is not None
 
 
-def shown(words: set[str], things: Iterable[Entity]) -> str:
-    """Find what the robot says to words for colour and shape. Empty: no thing has these."""
-    fits = {thing.id: len({thing.color, thing.shape} & words) for thing in things}
-    best = [id for id, fit in fits.items() if fit == max(fits.values()) > 0]
-    return (SEVERAL if len(best) > 1 else f"Look at [{best[0]}].") if best else ""
-
-
-async def say(robot: Robot, person: str, text: str, turn_index: Literal[2, 3]) -> None:
-    """Say a text to a person. What it asks at its end opens an exchange.
-
-    turn_index: 2: it answers; 3: it comes by itself.
-    """
-    if "{examples}" in text:
-        *some, last = islice(NEXT, 3)
-        text = text.format(examples=f"{', '.join(some)}, or: {last}")
-    if "{example}" in text:
-        text = text.format(example=next(NEXT))
-    match = re.fullmatch(r"(.*?[.!]?)\s*([^.!?]*\?)?", text)
-    told, asked = match.groups() if match else (text, None)
-    for words, index in ((told, turn_index), (asked, 1)):
-        if words:
-            await perform(robot, person, "full", parts_of(words), turn_index=index)
-
-
-def parts_of(text: str) -> list[dict[str, str]]:
-    """Make the parts of a turn: words, and what stands in brackets."""
-    parts = [
-        part_of(each) if number % 2 else {"say": each} for number, each in enumerate(re.split(r"\[(.*?)\]", text))
-    ]
-    return [each for each in parts if each.get("say", "words").strip(" .")]
-
-
-def part_of(bracket: str) -> dict[str, str]:
-    """Make the part of a turn that a bracket means: `nod`, `shake`, `look` and a thing, or a thing to be shown."""
-    if bracket in ("nod", "shake"):
-        return {"gesture": bracket}
-    word, _, thing = bracket.partition(" ")
-    return {"look": thing} if word == "look" else {"refer": bracket}
-
-
-async def perform(robot: Robot, person: str, status: str, parts: list[dict[str, str]], **more: int) -> None:
+async def perform(robot: Robot, person: str, status: str, parts: list[dict[str, Any]], **more: int) -> None:
     """Perform a turn for a person. One that cannot be performed is told, and the talk goes on."""
     try:
         await robot.perform({"turn_status": status, "parts": parts, **more}, addressee=person)
     except EngageError as error:  # they have gone, or somebody stops the robot
         print(error)
+
+
+async def talk(robot: Robot) -> None:
+    """Talk with all who are there, until cancelled."""
+    await SmallTalk().talk(robot)
 
 
 async def main() -> None:

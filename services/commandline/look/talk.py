@@ -41,7 +41,8 @@ if TYPE_CHECKING:
     from engage_hri.services.client.conversation.talk import Conversation
     from engage_hri.services.client.conversation.tools import ToolSource
 
-RULES = Path(__file__).with_name("small_talk.py")
+RULES = {"en": Path(__file__).with_name("small_talk.py"), "de": Path(__file__).with_name("small_talk_de.py")}
+"""Our managers, by language."""
 AGAIN: Seconds = 2.0
 """Time from the failure of a manager until it begins again."""
 LAST_WORDS: Seconds = 2.0
@@ -110,8 +111,9 @@ def main(options: Options) -> int:
     """Talk until a signal, or until the file that is heard is over."""
     if options.kiosk and not options.has_window:
         raise seat_refusal("--kiosk")
-    manager = read_manager(options.manager) if options.model is None else led_by_model(options)
-    config = options.read(complete(), defaults=tuple(_defaults(manager, options.has_window)))
+    language = options.read(complete()).hearing.language.replace("_", "-").split("-")[0].lower()
+    manager = read_manager(options.manager, language) if options.model is None else led_by_model(options)
+    config = options.read(complete(), defaults=tuple(_defaults(manager, options.has_window, language)))
     for lack in _lacks(config):
         complain(lack)
     if options.has_window:
@@ -122,16 +124,21 @@ def main(options: Options) -> int:
     return DONE
 
 
-def read_manager(path: Path | None) -> ManagerFile:
-    """Read a manager from its file, which is written if there is none; None: ours.
+def read_manager(path: Path | None, language: str = "en") -> ManagerFile:
+    """Read a manager from its file, which is written if there is none; None: ours, of a language.
 
-    Raises InputRefused: it cannot be run, or has no `talk`. Raises RunFailed: it cannot be written.
+    Raises InputRefused: it cannot be run, or has no `talk`, or there is none of ours. Raises RunFailed: it cannot be
+    written.
     """
+    if (path is None or not path.exists()) and language not in RULES:
+        advice = "--manager FILE.py with rules of yours, as docs/talk.md has them, or --model"
+        reason = f"no rules that come with it are in {language!r}, only in {', '.join(RULES)}"
+        raise InputRefused(Fault(reason=reason, where="hearing.language", advice=advice))
     if path is not None and not path.exists():
         with raised_as(RunFailed, OSError, path, "it cannot be written"):
-            path.write_bytes(RULES.read_bytes())
+            path.write_bytes(RULES[language].read_bytes())
             complain(f"{path} is written: change it, and start again")
-    names = _run(path or RULES)
+    names = _run(path or RULES[language])
     if not inspect.iscoroutinefunction(names.get("talk")):
         advice = "`async def talk(robot)`: it gets a Robot, and talks until it is cancelled"
         raise InputRefused(Fault(reason="there is no talk in it", where=str(path), advice=advice))
@@ -222,14 +229,16 @@ def _has(package: str) -> bool:
     return find_spec(package) is not None
 
 
-def _defaults(manager: ManagerFile, has_window: bool) -> Iterator[str]:
-    """Settings that hold where nothing else is said."""
+def _defaults(manager: ManagerFile, has_window: bool, language: str) -> Iterator[str]:
+    """Settings that hold where nothing else is said. language: of the people, who hear it of the robot as well."""
     yield "simulation.human=none"
     if _has("espeakng_loader"):
         yield "control.voice=espeak"
+        if language != "en":
+            yield f"control.drivers.espeak.language={language}"
     if has_window:
         yield from AT_PAGES
-    if _has("pocketsphinx") and manager.phrases:
+    if _has("pocketsphinx") and manager.phrases and language == "en":
         yield "hearing.recognizer=sphinx"
         yield f"hearing.phrases={json.encode(manager.phrases).decode()}"
 
@@ -239,7 +248,7 @@ def _lacks(config: RobotConfig) -> Iterator[str]:
     if not has_hearing():
         yield f"nobody is heard, for the extra `hearing` is not installed: {extra_command('hearing')}; you can type"
     elif not config.hearing.recognizer:
-        yield "voices are heard, and no words: --set hearing.recognizer=NAME, of docs/hearing.md"
+        yield "voices are heard, and no words, which people type: --set hearing.recognizer=NAME, of docs/hearing.md"
     if not config.control.voice and not _has("espeakng_loader"):
         yield f"the robot has no voice, for the extra `voice` is not installed: {extra_command('voice')}"
 

@@ -6,7 +6,7 @@ import { voice } from "../page/voice.js";
 import { put } from "./heads.js";
 
 const icon = (path) => `<svg viewBox="0 0 24 24" width="26" height="26" fill="none" stroke="currentColor" stroke-width="2" stroke-linecap="round" stroke-linejoin="round" aria-hidden="true">${path}</svg>`;
-const STAYS = 12000; // ms for which it is told why microphone, camera or voice went off
+const STAYS = 12000; // ms of a page that one sees for which it is told why microphone, camera or voice went off
 const ICONS = {
   mic: icon('<rect x="9" y="3" width="6" height="11" rx="3"/><path d="M5 11a7 7 0 0 0 14 0M12 18v3"/>'),
   loud: icon('<path d="M4 9.5v5h3.5L12 18.5v-13L7.5 9.5zM15.5 9a4 4 0 0 1 0 6M18 6.5a8 8 0 0 1 0 11"/>'),
@@ -42,6 +42,11 @@ export function bar({ top, bottom, order, turn, session, examples, spoken }) {
     sounds[name] = { ...now, since: was.state === now.state && was.news === now.news ? was.since : performance.now() };
     draw();
   };
+  let hidden = 0; // when the page was
+  document.addEventListener("visibilitychange", () => {
+    if (document.hidden) return (hidden = performance.now());
+    for (const each of Object.values(sounds)) each.since += performance.now() - Math.max(hidden, each.since);
+  });
   const other = button("other", turn);
   const loud = button("loud", () => {
     isMuted = sounds.voice.state === "on";
@@ -184,7 +189,7 @@ export function bar({ top, bottom, order, turn, session, examples, spoken }) {
       for (const [made, name] of [[nod, "nod"], [point, "point"], [leave, "leave"]]) made.lastChild.textContent = text[name];
       draw();
     },
-    // person: id of who looks; empty: no seat. ready: the robot can be talked with. company: ids of others. hears, sees: the
+    // person: id of who looks; empty: no seat. linked: the window answers. ready: the robot can be talked with. company: ids of others. hears, sees: the
     // robot hears people, and sees them.
     take(state) {
       const was = last?.person;
@@ -197,6 +202,9 @@ export function bar({ top, bottom, order, turn, session, examples, spoken }) {
         ear.off();
         eye.off();
         point.setAttribute("aria-pressed", "false");
+      } else if (state.person && state.linked) {
+        ear.back();
+        eye.back();
       }
       const hadFocus = (state.person ? away : here).contains(document.activeElement);
       draw();

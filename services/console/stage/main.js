@@ -82,7 +82,7 @@ function tell() {
   const { talk, scene, person } = state;
   const present = scene?.people.filter((each) => each.at && each.present && each.id !== person) ?? [];
   bar.take({
-    person, denied: state.denied, ready: talk?.state === "ready" && !state.link && Boolean(scene?.body), company: present.map(({ id }) => id),
+    person, denied: state.denied, linked: !state.link, ready: talk?.state === "ready" && !state.link && Boolean(scene?.body), company: present.map(({ id }) => id),
     part: part(talk, scene, person), speaks: isTalking(), hears: talk?.hears, sees: talk?.sees,
   });
   document.body.classList.toggle("seated", Boolean(person));
@@ -178,7 +178,10 @@ function hint(now) {
   if (!person) return "";
   if (isTalking()) return text.talks;
   if (bar.points) return text.pointing;
-  const named = (id) => state.scene.things.find((each) => each.id === id)?.label ?? text.called(id);
+  const named = (id) => {
+    const thing = state.scene.things.find((each) => each.id === id);
+    return thing ? text.thing(thing.label) : text.called(id);
+  };
   const met = moment(talk, state.scene.robot, person);
   const next = visit(now - idle, { seated: true, kiosk: isKiosk, touched });
   const tips = text.tips(bar.ear, bar.eye);

@@ -82,7 +82,7 @@ export function touch({ place, list, scene, state, order, bar }) {
       const rows = [
         ...(now.body?.eyes ? [[now.robot, text.robot, now.body.eyes]] : []),
         ...now.people.filter((each) => each.at && each.present && each.id !== person).map(({ id, at: place }) => [id, text.called(id), place]),
-        ...now.things.filter(({ kind }) => kind === "object").map(({ id, label, at: place }) => [id, label, place]),
+        ...now.things.filter(({ kind }) => kind === "object").map(({ id, label, at: place }) => [id, text.thing(label), place]),
       ];
       for (const [id, made] of buttons) {
         if (rows.some(([other]) => other === id)) continue;

@@ -26,13 +26,14 @@ export function part(talk, scene, id) {
 export function moment(talk, robot, you) {
   const bonds = talk.bonds.filter(({ by, to }) => (by === robot && to === you) || (by === you && to === robot));
   const says = talk.voices.find(({ actor, to }) => actor === robot && to.length)?.to ?? [];
+  const isInTurn = talk.bubbles.some(({ actor, open }) => actor === robot && open); // silent for a moment, and it goes on
   const waits = (kind) => bonds.find((each) => each.kind === kind && each.by === robot && !each.met);
   if (says.includes(you)) {
     const look = waits("directed_gaze");
     return look ? { text: "about", about: look.about[0] } : { text: "listen" };
   }
   if (says.length) return { text: "elsewhere", about: says[0] };
-  if (waits("adjacency_pair")) return { text: "looking" };
+  if (waits("adjacency_pair")) return { text: isInTurn ? "listen" : "looking" };
   if (waits("directed_gaze")) return { text: "about", about: waits("directed_gaze").about[0] };
   if (bonds.some((each) => each.kind === "mutual_facial_gaze" && each.met)) return { text: "mutual" };
   return waits("mutual_facial_gaze") ? { text: "meet" } : null;

@@ -36,6 +36,7 @@ const ENGLISH = {
   mine: { engaged: "are with us", engaging: "are joining", occupied: "are at the table", disengaging: "are drifting away", disengaged: "are elsewhere", unknown: "" },
   speaks: "speaks",
   looking: "The robot waits for your answer.",
+  thing: (label) => label,
   about: (thing) => `The robot looks at the ${thing}. Look at it, too: touch it.`,
   mutual: "You look into each other's eyes.",
   meet: "The robot looks at you. Touch its face to look back.",
@@ -102,7 +103,8 @@ const GERMAN = {
   mine: { engaged: "bist dabei", engaging: "kommst dazu", occupied: "bist am Tisch", disengaging: "schweifst ab", disengaged: "bist woanders", unknown: "" },
   speaks: "spricht",
   looking: "Der Roboter wartet auf deine Antwort.",
-  about: () => "Der Roboter schaut ein Teil an. Schau auch hin: berühre es.",
+  thing: (label) => label.split(" ").map((word) => PIECES[word] ?? word).join(" "),
+  about: (thing) => `Der Roboter schaut hin: ${thing}. Schau auch hin: berühre es.`,
   mutual: "Ihr schaut euch in die Augen.",
   meet: "Der Roboter schaut dich an. Berühre sein Gesicht, um zurückzuschauen.",
   listen: "Der Roboter spricht mit dir.",
@@ -132,6 +134,11 @@ const GERMAN = {
   flat: "Dieser Browser zeigt kein 3D. Worte und Knöpfe gehen trotzdem.",
   sound: { late: "", unheard: () => "Der Roboter hört dich gerade nicht.", plain: "diese Seite kam über http, und Browser wollen dafür https. Frag, wer sich um den Roboter kümmert" },
   seen: { models: "was Gesichter findet, ist hier nicht installiert. Frag, wer sich um den Roboter kümmert" },
+};
+// Words for pieces, as the world has them; others stay.
+const PIECES = {
+  orange: "oranges", white: "weißes", blue: "blaues", green: "grünes", purple: "lila", red: "rotes", pink: "rosa", yellow: "gelbes",
+  square: "Quadrat", triangle: "Dreieck", rectangle: "Rechteck", trapezoid: "Trapez",
 };
 const ALL = { en: ENGLISH, de: GERMAN };
 

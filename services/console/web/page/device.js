@@ -9,6 +9,7 @@ export function device(kind, session, face) {
   let on = null; // what is open while it is on, or asked for
   let news = null;
   let isLacking = false; // it could not be had since the last press, or has ended by itself
+  let isCut = false; // it has ended as its link was away for too long: it is on again by itself with the link
 
   // Why no page at this address can have it, in words; null: it can.
   const lacking = () => (navigator.mediaDevices?.getUserMedia && kind.has() ? null : (words) => words.none(isSecureContext ? words.unable : words.plain));
@@ -17,29 +18,30 @@ export function device(kind, session, face) {
     news = what;
     show();
   }
-  function off(what = null) {
-    if (on === null && what === null) return;
+  function off(what = null, why = {}) {
+    if (on === null && what === null && !isLacking && !isCut) return;
     const was = on ?? {};
     on = null;
+    ({ isLacking = false, isCut = false } = why);
     was.stream?.getTracks().forEach((track) => track.stop());
     was.worker?.terminate(); // and with it the link
     kind.end(was);
     face.level(0);
     tell(what);
   }
-  const failed = (reason) => off((words) => words.off(reason(words)));
+  const failed = (reason, why) => off((words) => words.off(reason(words)), why);
   const gone = () => failed((words) => words.gone);
 
   async function begin() {
     const own = (on = {});
+    isLacking = isCut = false;
     tell((words) => words.asks);
     let stream;
     try {
       stream = await navigator.mediaDevices.getUserMedia(kind.wants);
     } catch (error) {
       if (on !== own) return;
-      isLacking = true;
-      failed((words) => words[error.name] ?? error.message);
+      failed((words) => words[error.name] ?? error.message, { isLacking: true });
       return;
     }
     if (on !== own) return stream.getTracks().forEach((track) => track.stop());
@@ -64,10 +66,7 @@ export function device(kind, session, face) {
   // What the worker tells: how strong it is, what is wrong, or that it has ended, with the name of a text or words.
   function take({ level, wrong, ended }, track) {
     if (level !== undefined) return face.level(level);
-    if (ended !== undefined) {
-      isLacking = true;
-      return failed((words) => words[ended] ?? (ended || words.broken));
-    }
+    if (ended !== undefined) return failed((words) => words[ended] ?? (ended || words.broken), { isLacking: Boolean(ended), isCut: !ended });
     if (wrong === undefined) return;
     if (track.readyState === "ended") return gone();
     const [name, about] = wrong ?? (track.muted ? ["muted"] : []);
@@ -79,7 +78,10 @@ export function device(kind, session, face) {
   });
   show();
   return {
+    // The seat was left.
     off: () => off(),
+    // The window answers, and the one who pressed has their seat.
+    back: () => isCut && !document.hidden && begin(),
     press() {
       const reason = lacking();
       if (on) return off();

@@ -50,9 +50,9 @@ function devicePart(panel, id, session, { names, words, make, more = [], tell = 
   place.hidden = true;
   return {
     take(state, changed) {
-      if (!changed.has("you")) return;
-      place.hidden = !state.you.person;
-      if (!state.you.person) own.off();
+      if (changed.has("you")) place.hidden = !state.you.person;
+      if (state.you?.person) own.back();
+      else own.off();
     },
   };
 }
