@@ -42,6 +42,8 @@ PERIOD = 13.0
 """Seconds after which the microphone hears "stop" again."""
 LOUD = 0.005
 """What of the recording is sound."""
+PASSES = "new Promise((done) => setTimeout(done, %d))"
+"""Let time pass in the page, in milliseconds."""
 TEXT = (
     "The first rule is that each piece is laid beside another one, and the second rule is that no piece is laid upon "
     "another one, and the third rule is that all of the pieces are used."
@@ -123,18 +125,19 @@ async def stopped(folder: Path, rounds: int) -> list[Round]:
                 await news.came.wait()
             first, found, rng = news.voices[0], [], random.Random(3)
             for number in range(1, rounds + 1):
-                await asyncio.sleep(first + number * PERIOD - rng.uniform(1.5, 4.5) - time.monotonic())
+                begins = first + number * PERIOD - rng.uniform(1.5, 4.5)
+                await page.value(PASSES % (1000 * (begins - time.monotonic())), PERIOD + 10)
                 counts, since = (len(news.words), len(news.voices), len(news.decided)), time.monotonic()
                 turn = {"turn_status": "full", "parts": [{"say": TEXT}]}
                 await director.perform(turn, addressee="visitor", timeout=60)
-                await asyncio.sleep(1.0)
+                await page.value(PASSES % 1000)
                 words, voices, decided = (
                     all_of[count:]
                     for all_of, count in zip((news.words, news.voices, news.decided), counts, strict=True)
                 )
                 assert decided, "it was not heard"
                 found.append((since, time.monotonic(), words, voices[0], decided[0]))
-            await asyncio.sleep(1.0)
+            await page.value(PASSES % 1000)
             begin, samples, rate = await tapped(page, time.monotonic())
             assert page.errors == []
     played = Recorded(begin, samples.astype(float), rate)
