@@ -264,6 +264,25 @@ def test_the_partner_is_left_when_lost_and_found_again() -> None:
     assert stage.owners == [(0.0, "face", "bob"), (3.0, "face", "ann"), (9.0, "face", "bob")]
 
 
+def test_whose_other_id_becomes_known_is_looked_at_on() -> None:
+    """By the face, by a fragment, and by a look away to think: none of them aims at an id that is in no world."""
+    stage = Stage()
+    stage.do(lambda arbiter: arbiter.speak_to("bob2"))
+    stage.feed(people(bob2=1.0))
+    stage.do(lambda arbiter: arbiter.think("bob2"))
+    stage.do(lambda arbiter: arbiter.fragment_gazes("bob2"))
+    stage.do(lambda arbiter: arbiter.join("bob2", "bob"))
+    stage.feed(people(bob=1.0))
+    owners = [stage.owners[-1]]
+    stage.do(lambda arbiter: arbiter.fragment_lets_go())
+    owners.append(stage.owners[-1])
+    stage.do(lambda arbiter: arbiter.stop_thinking())
+    stage.until(1.0)
+    stage.do(lambda arbiter: arbiter.join("eve", "ann"))  # nobody's order holds the head
+
+    assert [target for _, _, target in (*owners, stage.owners[-1])] == ["bob"] * 3
+
+
 def test_the_robots_own_hand_and_face_are_not_followed() -> None:
     stage = Stage()
     hand = Entity(id="arm", kind="hand", owner="robot", position=(0.3, 0.0, 0.8), velocity=(0.5, 0.0, 0.0))

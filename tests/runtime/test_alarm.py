@@ -59,3 +59,17 @@ def test_an_alarm_rings_no_later_than_the_earliest_instant_it_was_given() -> Non
 
     with asyncio.Runner(loop_factory=VirtualTimeLoop) as runner:
         assert runner.run(main()) == [1.0, 4.0, 7.0]
+
+
+def test_a_timer_tells_when_it_is_to_ring() -> None:
+    async def main() -> list[float | None]:
+        timer = Timer(lambda: None)
+        told = [timer.at]
+        for at in (3.0, 2.0, None, 1.0):
+            timer.set(at)
+            told.append(timer.at)
+        await asyncio.sleep(5.0)
+        return [*told, timer.at]
+
+    with asyncio.Runner(loop_factory=WholeMilliseconds) as runner:
+        assert runner.run(main()) == [None, 3.0, 2.0, None, 1.0, None]

@@ -129,6 +129,26 @@ def test_nobody_says_two_things_at_once_and_looks_away_are_short() -> None:
         assert max(away) <= 3.0
 
 
+def test_who_is_spoken_to_gives_feedback_and_most_are_silent_while_the_robot_speaks() -> None:
+    signs, questions, talked_into = 0, 0, 0
+    for seed in range(3):
+        play = Play(4, seed)
+        play.until(LASTS)
+        turns = [said for said in play.said if said.kind in ("talk", "answer")]
+        for sign in play.said:
+            if sign.kind == "feedback" and sign.to != ROBOT:
+                signs += 1
+                assert any(said.actor == sign.to and said.began < sign.began < said.ended for said in turns)
+        questions += len(play.questions)
+        talked_into += sum(
+            any(said.kind == "talk" and question.began < said.began < question.ended for said in turns)
+            for question in play.questions
+        )
+
+    assert signs > 10
+    assert 0 < talked_into < 0.3 * questions
+
+
 def test_a_script_says_who_says_what_to_whom() -> None:
     script = [ScriptLine("ann", "bob", "Is that yours?"), ScriptLine("bob", "ann", "No, it is hers.", after=-0.2)]
     party = Party(NAMES[:2], random.Random(1), script=script, tells=True)
