@@ -9,6 +9,7 @@ from typing import NamedTuple
 import pytest
 
 from engage_hri.schemas.perception import ActorLost
+from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.world import Entity, World
 from tests.generation.head_stories import check
 from tests.generation.heads import AT, Stage, act, event, inhibition, on_the_face, statistics, world
@@ -262,6 +263,25 @@ def test_the_partner_is_left_when_lost_and_found_again() -> None:
     stage.feed(people(ann=1.0, bob=2.0))
 
     assert stage.owners == [(0.0, "face", "bob"), (3.0, "face", "ann"), (9.0, "face", "bob")]
+
+
+def test_of_several_who_were_asked_each_is_looked_at_in_turn_until_one_is_left() -> None:
+    def asked(who: str, state: str = "started") -> ConnectionEvent:
+        return event(who, state, kind="adjacency_pair", initiator="robot", responder=who, objects=())
+
+    stage = Stage()
+    stage.feed(people(ann=1.0, bob=1.1, cy=1.2))
+    stage.do(lambda arbiter: arbiter.speak_to("ann"))
+    stage.feed(asked("ann"), asked("bob"), asked("cy"))
+    stage.do(lambda arbiter: arbiter.wait_for_answers())
+    stage.until(4.0)
+    stage.feed(asked("bob", "failed"), asked("cy", "failed"))
+    stage.until(5.0)
+
+    assert stage.owners == [
+        (0.0, "face", "ann"), (0.8, "face", "bob"), (1.6, "face", "cy"),
+        (2.4, "face", "ann"), (3.6, "face", "bob"), (4.4, "face", "ann"),
+    ]  # fmt: skip
 
 
 def test_whose_other_id_becomes_known_is_looked_at_on() -> None:

@@ -78,6 +78,23 @@ def refused(text: str | bytes) -> Fault:
     return fault
 
 
+def test_a_document_is_written_for_people_to_read_it_and_white_space_of_speech_is_kept() -> None:
+    block = Block(id="b", behaviors=(Gaze(id="g", target="cup"), Speech(id="s", text="Well,  this")))
+
+    assert (
+        encode_xml(block).decode()
+        == """\
+<?xml version='1.0' encoding='utf-8'?>
+<bml xmlns="org.mindmakers.bml" id="b">
+  <gaze id="g" target="cup"/>
+  <speech id="s">
+    <text xml:space="preserve">Well,  this</text>
+  </speech>
+</bml>
+"""
+    )
+
+
 def test_a_turn_fragment_is_read_with_the_line_of_everything() -> None:
     assert decode_xml(FRAGMENT) == TurnFragment(
         id="place",
