@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from engage_hri.services.perception.hearing.own_voice import Canceller, CautiousJudge, OwnVoice
 from engage_hri.services.perception.hearing.voice import (
     BEFORE,
     LATE,
@@ -103,6 +104,24 @@ def test_it_does_not_matter_how_sound_is_cut_into_pieces(sizes: list[int]):
     assert [(type(one), round(one.at, 6)) for one in edges(told)] == [
         (type(one), round(one.at, 6)) for one in edges(whole.feed(sound, 0.0))
     ]
+
+
+def test_a_voice_over_the_robots_counts_once_there_was_silence_where_the_robots_was_for_sure():
+    canceller = Canceller(OwnVoice())
+    canceller.sounds = True
+    likely = [0.0]
+    judge = CautiousJudge(lambda _: likely[0], canceller)
+
+    def told(likelihood: float, windows: int, *, sure: bool = True) -> list[float]:
+        likely[0], canceller.is_sure = likelihood, sure
+        return [judge(np.zeros(WINDOW, np.float32)) for _ in range(windows)]
+
+    silence_that_may_be_before_the_voice = told(0.05, 100, sure=False)
+    assert {*silence_that_may_be_before_the_voice, *told(0.9, 100)} == {0.0}
+    told(0.05, 15)
+    assert told(0.9, 3) == [0.9, 0.0, 0.0]
+    told(0.05, 60)
+    assert told(0.9, 100) == [0.9] * 100
 
 
 @pytest.mark.parametrize("noise", [None, 10.0, 5.0])

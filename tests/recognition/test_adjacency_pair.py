@@ -78,6 +78,10 @@ a question that is asked can be cancelled
     1 asked; 2.2 cancels 1
     robot's ap-1: started 1, withdrawn 2.2
 
+a third turn while somebody talks into the first ends both
+    1 asking; 1.5 human +speak; 2.5 turn repaired
+    robot's ap-1: started 1, succeeded 2.5 after -1 by speak, completed 2.5 lasting 1
+
 who interrupted an aborted turn has answered
     1 asking; 1.5 human +speak; 2.4 time; 2.5 turn aborted
     robot's ap-1: started 1, succeeded 2.5 after -1 by speak
