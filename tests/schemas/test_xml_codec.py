@@ -260,6 +260,13 @@ def test_a_reference_to_a_mark_that_looks_like_an_offset_is_made_explicit() -> N
     assert decoded.behaviors[1].timing == (Timing("start", "s:m-2+0"), Timing("end", "g:stroke-2"))
 
 
+def test_a_mark_without_a_name_is_refused_with_its_line() -> None:
+    with pytest.raises(InputRefused, match="a mark without a name") as refused:
+        block('<speech id="s"><text>a\n<sync/> b</text></speech>')
+
+    assert refused.value.fault.line == 2
+
+
 def test_before_and_after_keep_their_sides() -> None:
     decoded = block("""<gaze id="g" target="t"/><constraint id="c">
       <before ref="3"><sync ref="g:end"/><sync ref="g:relax + 1"/></before>
