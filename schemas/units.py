@@ -32,6 +32,26 @@ A message whose vector has a part beyond `FARTHEST`, or one that is no number, i
 """
 
 
+def plus(one: Vector, other: Vector) -> Vector:
+    """Sum of two vectors."""
+    return (one[0] + other[0], one[1] + other[1], one[2] + other[2])
+
+
+def minus(one: Vector, other: Vector) -> Vector:
+    """Difference of two vectors: the way from the other to the one."""
+    return (one[0] - other[0], one[1] - other[1], one[2] - other[2])
+
+
+def times(vector: Vector, factor: float) -> Vector:
+    """The vector, as many times as long."""
+    return (vector[0] * factor, vector[1] * factor, vector[2] * factor)
+
+
+def between(start: Vector, end: Vector, share: float) -> Vector:
+    """Place on the straight way from `start` to `end`, after a share of it."""
+    return plus(start, times(minus(end, start), share))
+
+
 LATEST = 1e12
 """Seconds: the latest instant of any clock, in some 30 000 years."""
 

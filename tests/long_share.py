@@ -63,7 +63,6 @@ LONG = {
 """Files and folders whose tests are long though they are not marked `real_time`, with the reason."""
 
 LONG_TESTS = {
-    "access/test_denials.py": {},
     "cli/test_console.py": {
         "test_a_demo_is_recorded": "a whole task",
     },

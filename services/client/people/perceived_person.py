@@ -17,7 +17,7 @@ from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.perception import ANOTHER_ID, LONGEST_ID, LONGEST_TEXT, ActorFound, Utterance
 from engage_hri.schemas.text import is_utf8
-from engage_hri.schemas.units import A_DAY, Seconds, Stamp, Vector
+from engage_hri.schemas.units import A_DAY, Seconds, Stamp, Vector, between, plus
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.client.inputs import taken
@@ -333,7 +333,7 @@ class PerceivedPerson:
     async def _carry(self, thing: Entity, to: Vector, seconds: Seconds) -> None:
         began = self._bus.now()
         while (left := began + seconds - self._bus.now()) > 0:
-            self._hold(thing, _between(thing.position, to, 1 - left / seconds))
+            self._hold(thing, between(thing.position, to, 1 - left / seconds))
             await asyncio.sleep(min(FRAME, left))
         self._hold(thing, to)
 
@@ -343,7 +343,7 @@ class PerceivedPerson:
         self.bring(replace(thing, position=position), *([hand] if hand is not None else []))
 
     def _rest(self) -> None:
-        if not self._has_left and (hand := self._hand(_sum(self._body.position, LAP))) is not None:
+        if not self._has_left and (hand := self._hand(plus(self._body.position, LAP))) is not None:
             self.bring(hand)
 
     def _show(self) -> None:
@@ -372,7 +372,7 @@ class PerceivedPerson:
             place = position or free_seat([each.position for each in self._world.entities if each.kind == "person"])
             self._own[self.id] = Entity(id=self.id, kind="person", position=place, placeless=position is None)
             self._own[f"{self.id}-hand"] = Entity(
-                id=f"{self.id}-hand", kind="hand", owner=self.id, position=_sum(place, LAP)
+                id=f"{self.id}-hand", kind="hand", owner=self.id, position=plus(place, LAP)
             )  # fmt: skip
             self._show()
         self._tell(self._actions.comes(self._bus.stamp()))
@@ -410,18 +410,6 @@ class PerceivedPerson:
 
 def _ids(to: Collection[str]) -> tuple[str, ...]:
     return (to,) if isinstance(to, str) else tuple(to)
-
-
-def _sum(place: Vector, way: Vector) -> Vector:
-    return (place[0] + way[0], place[1] + way[1], place[2] + way[2])
-
-
-def _between(start: Vector, end: Vector, share: float) -> Vector:
-    return (
-        start[0] + share * (end[0] - start[0]),
-        start[1] + share * (end[1] - start[1]),
-        start[2] + share * (end[2] - start[2]),
-    )
 
 
 def free_seat(taken: Collection[Vector], skip: int = 0) -> Vector:

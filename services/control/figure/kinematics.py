@@ -17,7 +17,7 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from engage_hri.schemas.body import BodyPose, JointAngle, JointLimit, Ray
-from engage_hri.schemas.units import Meters, Radians, Vector
+from engage_hri.schemas.units import Meters, Radians, Vector, minus, plus, times
 
 Array = NDArray[np.float64]
 Side = Literal["left", "right"]
@@ -155,7 +155,7 @@ def gaze(pose: Pose) -> Ray:
     """Gaze as a ray: from between the eyes along their axis."""
     trunk = _trunk(pose)
     ahead, up = axes(pose["neck_yaw"], pose["neck_pitch"], pose["neck_roll"])
-    eyes = _add(NECK, _add(_scale(ahead, EYES_AHEAD), _scale(up, EYES_ABOVE)))
+    eyes = plus(NECK, plus(times(ahead, EYES_AHEAD), times(up, EYES_ABOVE)))
     return Ray(origin=_to_world(eyes, trunk), axis=_turned(ahead, trunk))
 
 
@@ -165,7 +165,7 @@ def axes(yaw: Radians, pitch: Radians, roll: Radians) -> tuple[Vector, Vector]:
     ahead = (cos_pitch * cos_yaw, cos_pitch * sin_yaw, sin_pitch)
     left = (-sin_yaw, cos_yaw, 0.0)
     up = (-sin_pitch * cos_yaw, -sin_pitch * sin_yaw, cos_pitch)
-    return ahead, _add(_scale(up, cos(roll)), _scale(left, sin(roll)))
+    return ahead, plus(times(up, cos(roll)), times(left, sin(roll)))
 
 
 def turned_to(x: Meters, y: Meters, z: Meters, above: Meters) -> tuple[float, float]:
@@ -178,9 +178,9 @@ def turned_to(x: Meters, y: Meters, z: Meters, above: Meters) -> tuple[float, fl
 def arm(pose: Pose, side: Side) -> Ray:
     """Forearm as a ray: from the elbow, tip at the hand."""
     yaw, pitch, trunk = pose[f"{side}_shoulder_yaw"], pose[f"{side}_shoulder_pitch"], _trunk(pose)
-    elbow = _add(SHOULDER[side], _scale(_arm_direction(yaw, pitch), UPPER_ARM))
+    elbow = plus(SHOULDER[side], times(_arm_direction(yaw, pitch), UPPER_ARM))
     axis = _arm_direction(yaw, pitch + pose[f"{side}_elbow"])
-    hand = _add(elbow, _scale(axis, FOREARM))
+    hand = plus(elbow, times(axis, FOREARM))
     return Ray(origin=_to_world(elbow, trunk), axis=_turned(axis, trunk), tip=_to_world(hand, trunk))
 
 
@@ -201,22 +201,22 @@ def look_at(target: Vector, pose: Pose, reserve: Radians = 0.0) -> tuple[float, 
 
 def neck_angles(target: Vector, pose: Pose) -> tuple[float, float]:
     """Neck yaw and pitch whose gaze axis runs through `target`, whether the joints come there or not."""
-    return turned_to(*_subtract(_to_torso(target, pose), NECK), EYES_ABOVE)
+    return turned_to(*minus(_to_torso(target, pose), NECK), EYES_ABOVE)
 
 
 def arm_angles(side: Side, target: Vector, pitch: Radians, pose: Pose) -> tuple[float, float, float]:
     """Angles of the `side` arm with the shoulder at `pitch` whose forearm axis runs through `target`, within the
     joints' limits or not."""
-    x, y, z = _subtract(_to_torso(target, pose), SHOULDER[side])
+    x, y, z = minus(_to_torso(target, pose), SHOULDER[side])
     return _pointing(x, y, z, pitch)
 
 
 def arm_angles_over(side: Side, target: Vector, pitch: Radians | Array, trunks: Array) -> tuple[Array, Array, Array]:
     """The same for many places of the torso at once. trunks: 2 x places. pitch: one, or any shape x places."""
-    (x, y, z), (turn, lean) = _subtract(target, HIP), trunks
+    (x, y, z), (turn, lean) = minus(target, HIP), trunks
     ahead, aside = x * np.cos(turn) + y * np.sin(turn), y * np.cos(turn) - x * np.sin(turn)
     forward, height = ahead * np.cos(lean) - z * np.sin(lean), z * np.cos(lean) + ahead * np.sin(lean)
-    shoulder = _subtract(SHOULDER[side], HIP)
+    shoulder = minus(SHOULDER[side], HIP)
     x, y, z = forward - shoulder[0], aside - shoulder[1], height - shoulder[2]
     out = np.arctan2(np.hypot(x, y) - UPPER_ARM * np.sin(pitch), -z - UPPER_ARM * np.cos(pitch)) - pitch
     yaw, lift, _ = np.broadcast_arrays(np.arctan2(y, x), pitch, out)
@@ -243,7 +243,7 @@ def _aim(
 ) -> ArmAim | str:
     """Angles that point at `target`, or why there are none."""
     pose = {"torso_turn": trunk[0], "torso_lean": trunk[1]}
-    x, y, z = _subtract(_to_torso(target, pose), SHOULDER[side])
+    x, y, z = minus(_to_torso(target, pose), SHOULDER[side])
     distance = hypot(x, y, z)
     if distance > REACH:
         return f"it is {distance:.2f} m from the {side} shoulder, farther than {REACH} m"
@@ -380,23 +380,11 @@ def _turned(vector: Vector, trunk: tuple[float, float, float, float]) -> Vector:
 
 
 def _to_world(point: Vector, trunk: tuple[float, float, float, float]) -> Vector:
-    return _add(HIP, _turned(_subtract(point, HIP), trunk))
+    return plus(HIP, _turned(minus(point, HIP), trunk))
 
 
 def _to_torso(point: Vector, pose: Pose) -> Vector:
-    (x, y, z), lean, turn = _subtract(point, HIP), pose["torso_lean"], pose["torso_turn"]
+    (x, y, z), lean, turn = minus(point, HIP), pose["torso_lean"], pose["torso_turn"]
     x, y = x * cos(turn) + y * sin(turn), y * cos(turn) - x * sin(turn)
     x, z = x * cos(lean) - z * sin(lean), z * cos(lean) + x * sin(lean)
-    return _add(HIP, (x, y, z))
-
-
-def _add(one: Vector, other: Vector) -> Vector:
-    return (one[0] + other[0], one[1] + other[1], one[2] + other[2])
-
-
-def _subtract(one: Vector, other: Vector) -> Vector:
-    return (one[0] - other[0], one[1] - other[1], one[2] - other[2])
-
-
-def _scale(vector: Vector, factor: float) -> Vector:
-    return (vector[0] * factor, vector[1] * factor, vector[2] * factor)
+    return plus(HIP, (x, y, z))

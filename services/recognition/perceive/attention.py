@@ -34,7 +34,7 @@ from engage_hri.schemas.perception import (
     VoiceActivity,
 )
 from engage_hri.schemas.recognition import HeadHabit
-from engage_hri.schemas.units import Probability, Seconds, Stamp, Vector
+from engage_hri.schemas.units import Probability, Seconds, Stamp, Vector, minus
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import Absent
 from engage_hri.services.recognition.config import RecognitionConfig
@@ -314,7 +314,7 @@ class Attention:
         head = targets.beside_robot(eyes, pose.direction)
         there = targets.place(next(reversed(actor.known.values()))) if actor.known else None
         if there is not None and there != eyes:
-            known = targets.beside_robot(eyes, (there[0] - eyes[0], there[1] - eyes[1], there[2] - eyes[2]))
+            known = targets.beside_robot(eyes, minus(there, eyes))
             if sure.is_another(known, at):
                 self._learned(actor)
             sure.take(head, known, spread, at)

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
-from engage_hri.schemas.units import FARTHEST, Meters, Probability, Radians, Seconds, Vector
+from engage_hri.schemas.units import FARTHEST, Meters, Probability, Radians, Seconds, Vector, minus
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import GAZE_MARGIN, RecognitionConfig
 from engage_hri.services.recognition.perceive.attending import Offset
@@ -109,7 +109,7 @@ class _Gaze:
 
     def across(self, place: Vector) -> tuple[float, float] | None:
         """Coordinates of a place across the ray: distance from (0, 0) is the tangent of its angle. None if behind."""
-        from_eye = _minus(place, self.eye)
+        from_eye = minus(place, self.eye)
         depth = _dot(from_eye, self.axis)
         if depth <= 1e-9:
             return None
@@ -124,7 +124,7 @@ class _Gaze:
         distance = math.dist(center, self.eye)
         if distance <= thing.radius:
             return 0.0
-        along = _dot(_minus(center, self.eye), self.axis)
+        along = _dot(minus(center, self.eye), self.axis)
         angle = math.acos(max(-1.0, min(1.0, along / max(distance, 1e-9))))
         return max(0.0, angle - math.asin(thing.radius / max(distance, 1e-9)))
 
@@ -207,19 +207,19 @@ class GazeTargets:
 
     def beside_robot(self, eyes: Vector, direction: Vector) -> Offset:
         """Angles of a direction to the left and up of the line from these eyes to the robot's face."""
-        there, (left, up) = _bearing(direction), _bearing(_minus(self._known[self._robot].entity.position, eyes))
+        there, (left, up) = _bearing(direction), _bearing(minus(self._known[self._robot].entity.position, eyes))
         return math.remainder(there[0] - left, 360.0), there[1] - up
 
     def towards(self, eyes: Vector, beside: Offset) -> Vector:
         """Direction with these angles (`beside_robot`)."""
-        left, up = _bearing(_minus(self._known[self._robot].entity.position, eyes))
+        left, up = _bearing(minus(self._known[self._robot].entity.position, eyes))
         left, up = math.radians(left + beside[0]), math.radians(max(-90.0, min(90.0, up + beside[1])))
         return math.cos(left) * math.cos(up), math.sin(left) * math.cos(up), math.sin(up)
 
     def offset_of_robot(self, gaze: tuple[Vector, Vector]) -> Offset:
         """Offset of the robot's face from the direction of a gaze. gaze: place of the eyes, and direction."""
         ray, face = _Gaze(*gaze), self._known[self._robot].entity.position
-        away, (x, y, z) = _minus(face, ray.eye), ray.axis
+        away, (x, y, z) = minus(face, ray.eye), ray.axis
         angle = math.degrees(math.acos(max(-1.0, min(1.0, _dot(away, ray.axis) / max(math.hypot(*away), 1e-9)))))
         flat = math.hypot(x, y)
         level = (x / flat, y / flat) if flat > 0.0 else (1.0, 0.0)
@@ -369,10 +369,6 @@ class GazeTargets:
 
 def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _minus(a: Vector, b: Vector) -> Vector:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 def _bearing(direction: Vector) -> Offset:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from msgspec import Struct, field
 
-from engage_hri.schemas.units import Meters, Probability, Seconds, Vector
+from engage_hri.schemas.units import Meters, Probability, Seconds, Vector, between, minus, plus
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.scene import Covering
@@ -174,7 +174,7 @@ class Manipulation:
             found = self._reappears(id, piece, entity, at)
         elif math.dist(place, piece.place) <= TREMOR:
             piece.still_at, piece.hands_then = at, self._hands
-            piece.place = _between(piece.place, place, FOLLOW)
+            piece.place = between(piece.place, place, FOLLOW)
         elif math.dist(place, piece.place) >= MOVED:
             if hand := self._moving_along(piece, entity.position):
                 found = self._begin(id, piece, entity, hand, piece.still_at)
@@ -205,7 +205,7 @@ class Manipulation:
                 del piece.touched[min(piece.touched, key=lambda hand: piece.touched[hand])]
         elif piece.holder in self._hands:
             palm = self._hands[piece.holder].position
-            self._pause(piece, _plus(palm, piece.grip), at)
+            self._pause(piece, plus(palm, piece.grip), at)
 
     def _averaged(self, piece: _Piece, place: Vector, at: Seconds) -> Vector:
         piece.sights.append((at, place))
@@ -221,8 +221,7 @@ class Manipulation:
 
     def _grip(self, piece: _Piece, place: Vector) -> None:
         if piece.holder in self._hands:
-            x, y, z = self._hands[piece.holder].position
-            piece.grip = (place[0] - x, place[1] - y, place[2] - z)
+            piece.grip = minus(place, self._hands[piece.holder].position)
 
     def _rest(self, piece: _Piece) -> None:
         """Let the piece rest where it is."""
@@ -280,11 +279,3 @@ class Manipulation:
             return []
         del self._acts[owner]
         return [PersonChanges(owner, [Change(False, "act", at, (act.first,), act.confidence)])]
-
-
-def _between(a: Vector, b: Vector, share: float) -> Vector:
-    return (a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), a[2] + share * (b[2] - a[2]))
-
-
-def _plus(a: Vector, b: Vector) -> Vector:
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])

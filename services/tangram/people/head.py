@@ -5,7 +5,7 @@ Pure; directions are unit vectors in the robot's frame.
 
 import math
 
-from engage_hri.schemas.units import Seconds, Vector
+from engage_hri.schemas.units import Seconds, Vector, minus
 from engage_hri.services.tangram.people.table import Table, minimum_jerk
 
 ASIDE: Vector = (-0.3, 0.95, 0.1)
@@ -73,7 +73,7 @@ def angle(one: Vector, other: Vector) -> float:
 
 
 def _toward(place: Vector, eyes: Vector) -> Vector:
-    return unit((place[0] - eyes[0], place[1] - eyes[1], place[2] - eyes[2]))
+    return unit(minus(place, eyes))
 
 
 def _between(one: Vector, other: Vector, part: float) -> Vector:

@@ -11,7 +11,7 @@ import msgspec
 from msgspec import Struct
 
 from engage_hri.schemas.tables import PiecePose
-from engage_hri.schemas.units import Meters, Seconds, Vector
+from engage_hri.schemas.units import Meters, Seconds, Vector, between
 from engage_hri.schemas.world import Entity
 from engage_hri.services.tangram.table import TangramTable
 
@@ -41,7 +41,7 @@ class Movement(Struct, frozen=True, kw_only=True):
 
     def position(self, now: Seconds) -> Vector:
         done = self.progress(now)
-        return _between(self.start, self.end, done)
+        return between(self.start, self.end, done)
 
     def velocity(self, now: Seconds) -> Vector:
         duration = self.until - self.since
@@ -193,7 +193,3 @@ def minimum_jerk(part: float) -> float:
     """Share of the way that is done, 0..1, after `part` of the time: people move like this."""
     part = min(1.0, max(0.0, part))
     return part**3 * (10.0 - 15.0 * part + 6.0 * part**2)
-
-
-def _between(start: Vector, end: Vector, part: float) -> Vector:
-    return tuple(a + part * (b - a) for a, b in zip(start, end, strict=True))  # type: ignore[return-value]
