@@ -457,7 +457,8 @@ def is_noise(one: Span, timeline: Timeline) -> bool:
             if one.to == ROBOT and since < one.since < until:
                 if until < one.until:
                     return False
-                longest = WORDS_WAIT if one.who in turn.to else longest
+                if one.who in turn.to:
+                    longest, wait = WORDS_WAIT, one.since[0] + WORDS_WAIT
                 wait = max(wait, until[0])
     if one.known is None or (one.known[0] > wait and has_spoken_since(one, timeline)):
         return one.seconds <= longest + ROUND

@@ -116,7 +116,7 @@ def _reading(one: Into, timeline: Timeline) -> set[str]:
     beside = [
         each for each in timeline.spans
         if each.who == speech.who and each.action in ("nod", "shake", "point")
-        and each.since < speech.until and speech.since < each.until
+        and turn.since < each.since < speech.until and speech.since < each.until
     ]  # fmt: skip
     is_long = speech.seconds > WORDS_WAIT + ROUND and wait < over  # it has been one that interrupts before
     is_of_answer = not is_long and turn.kind == "asks" and any(turn.until < each.until for each in beside)

@@ -16,6 +16,10 @@ no answer fails at the limit after the turn's end
     1 asked; 9 time
     robot's ap-1: started 1, failed 3.5 after 2.5
 
+who nods too late, and begins to speak before that is over, has answered with both
+    1 asked; 4 human +nod; 4.3 human +speak; 4.5 human -nod; 5 human -speak; 9 time
+    robot's ap-1: started 1, failed 3.5 after 2.5, failed 4 after 2
+
 manipulation has longer when it is accepted
     1 asked act; 9.5 human +act blue; 11 human -act blue
     robot's ap-1: started 1, succeeded 9.5 after 7.5 by act, completed 11 lasting 1.5

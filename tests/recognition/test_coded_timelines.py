@@ -20,6 +20,12 @@ JUDGES: dict[str, tuple[Differences, int]] = {
 }
 """Each with the number of timelines."""
 PARTS = 10
+MENDED = {
+    "talk": (8042, 8500, 8571, 8840, 8927, 8994, 7014, 7018, 7115, 7184, 7219, 5632, 12259, 12410, 13094, 14155),
+    "company": (8004, 8024, 8034, 3009, 3014, 3033, 3092, 5038, 5199, 12009, 12082, 12151, 13045, 13103, 13127),
+    "joins": (8001, 8014, 4009, 4024, 4095, 4130, 4135, 4145, 12032, 12148),
+}
+"""Timelines that differed once, each for a cause of its own."""
 
 
 @pytest.mark.parametrize("part", range(share_of(PARTS)))
@@ -36,3 +42,10 @@ def test_events_are_those_that_a_coder_writes_down(judge: str, part: int) -> Non
 
     assert coded > 0
     assert not wrong, wrong[:3]
+
+
+@pytest.mark.parametrize("judge", MENDED)
+def test_what_differed_once_is_as_coded(judge: str) -> None:
+    differing = {seed: JUDGES[judge][0](seed)[1] for seed in MENDED[judge]}
+
+    assert not any(differing.values()), differing

@@ -324,8 +324,9 @@ class SessionScene:
         ]
         if not waiting:
             return False
-        asked = max(waiting)[1]
-        del self.questions[asked]
+        since, asked = max(waiting)
+        # Who was asked in the same turn is told of it later.
+        self.questions = {who: each for who, each in self.questions.items() if each.since != since}
         self.taken_up.append(TakenUp(asked, person, action, at))
         return True
 
