@@ -80,6 +80,27 @@ def test_who_looks_at_it_no_longer_has_no_more_claim_than_others(news: object) -
     assert stage.owners[-1][2] == "cem"
 
 
+def test_who_speaks_gets_the_eyes_at_once_from_who_has_only_looked_or_has_finished() -> None:
+    stage = company()
+    stage.until(12.0)
+    stage.feed(event("gaze", "started", kind="mutual_facial_gaze", initiator="ben", objects=()))
+    speak(stage, 12.1, "cem")
+    stage.feed(event("gaze", "failed", kind="mutual_facial_gaze", initiator="ben", objects=()))
+    speak(stage, 14.0)
+    speak(stage, 14.1, "ben")
+    stage.until(15.0)
+    assert stage.owners == [(12.0, "response", "ben"), (12.3, "response", "cem"), (14.3, "response", "ben")]
+
+    both = company()
+    speak(both, 12.0, "ben")
+    look_at(both, "cem", "robot")
+    speak(both, 12.3, "ben", "cem")
+    both.until(15.0)
+    assert both.owners[-2:] == [(12.2, "response", "ben"), (13.0, "response", "cem")], (
+        "of two who speak each has 0.8 s"
+    )
+
+
 def test_it_looks_at_the_speaker_soon_and_comes_back_after_the_speech() -> None:
     stage = company()
     speak(stage, 10.0, "ben")

@@ -52,6 +52,7 @@ class ListeningPolicy(HeadPolicy):
         elif isinstance(message, Floor):
             known, self._speaking = self._speaking, {each.actor: now for each in message.speeches}
             self._speaking |= {who: since for who, since in known.items() if who in self._speaking}
+            self.scene.speaking = tuple(self._speaking)
             self._to_others = {each.actor for each in message.speeches if each.to and self.scene.robot not in each.to}
             asked = self.scene.asked if self.scene.waits else ()
             self.scene.to_robot = tuple(
