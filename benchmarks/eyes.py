@@ -137,7 +137,7 @@ def after_sure_looks(rows: Sequence[Measured]) -> dict[str, float]:
 
     Each head goes its own share of the way from the robot to what is looked at, as people's do (`film_of_looks`).
     """
-    before, after = [], []
+    before, after = list[Angles](), list[Angles]()
     for person in sorted({row.person for row in rows}):
         chance = np.random.default_rng([37, person])
         share = np.array(habit(chance))
@@ -148,15 +148,17 @@ def after_sure_looks(rows: Sequence[Measured]) -> dict[str, float]:
             SureLook(head=row.told, aim=(float(aim[0]), float(aim[1])), spread=row.stated) for row, aim in own[:SURE]
         )
         for known, wrong in ((SureLooks(), before), (looks, after)):
-            wrong += [np.subtract(known.aim(row.told, row.stated)[0], aim) for row, aim in own[SURE:]]
+            for row, aim in own[SURE:]:
+                (yaw, pitch), _ = known.aim(row.told, row.stated)
+                wrong.append((yaw - aim[0], pitch - aim[1]))
     figures = {}
     for name, wrong in (("no sure look", before), ("six sure looks", after)):
-        yaw, pitch = np.array(wrong).T
+        aside, above = np.array(wrong).T
         figures |= {
-            f"what is looked at after {name}, beside, mean": np.hypot(yaw, pitch).mean(),
-            "... median, " + name: np.median(np.hypot(yaw, pitch)),
-            "... yaw, bias, " + name: yaw.mean(),
-            "... pitch, bias, " + name: pitch.mean(),
+            f"what is looked at after {name}, beside, mean": np.hypot(aside, above).mean(),
+            "... median, " + name: np.median(np.hypot(aside, above)),
+            "... yaw, bias, " + name: aside.mean(),
+            "... pitch, bias, " + name: above.mean(),
         }
     return {name: round(float(value), 2) for name, value in figures.items()}
 
