@@ -193,10 +193,6 @@ a neighbor's sound that may still be a cough takes no answer from the robot
     0 ann said 0; 1 robot asks bob 1; 2 ann looks bob; 2 ann speaks 2; 3 bob speaks 1.2; 4.3 bob said 3; 9 end
     robot: started 1, succeeded 3 after 1, completed 4.2
 
-... but it does if its words are known with his
-    0 ann said 0; 1 robot asks bob 1; 2 ann looks bob; 2 ann speaks 2; 3 bob speaks 1; 4 ann said 2; 4 bob said 3
-    robot: started 1, failed 6
-
 what she says to another into the question is no answer, if perception says so, although she looks at the robot
     0 ann said 0; 1 robot asks ann 5; 2 ann looks robot; 3 ann speaks 0.6; 3.9 ann said 3 to=bob; 20 end
     robot: started 1, failed 10
