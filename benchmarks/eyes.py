@@ -151,7 +151,7 @@ def after_sure_looks(rows: Sequence[Measured]) -> dict[str, float]:
             for row, aim in own[SURE:]:
                 (yaw, pitch), _ = known.aim(row.told, row.stated)
                 wrong.append((yaw - aim[0], pitch - aim[1]))
-    figures = {}
+    figures: dict[str, float] = {}
     for name, wrong in (("no sure look", before), ("six sure looks", after)):
         aside, above = np.array(wrong).T
         figures |= {

@@ -38,7 +38,7 @@ SECTIONS = {
         "SetPointBody", "SimulatedServos", "OrdinaryBody", "Body", "MovementAuthority", "Arrived", "Reached",
         "JointLimit", "Ray",
     ),
-    "Writing a policy of the head, or of turns": ("HeadPolicy", "TurnPolicy"),
+    "Writing a policy of the head, or of turns": ("HeadPolicy", "RobotSign", "TurnPolicy"),
     "What goes wrong": (
         "EngageError", "InputRefused", "RunFailed", "PerformFailed", "RequestRefused", "BehaviorRefused", "Fault",
     ),

@@ -25,7 +25,7 @@ PAUSE: Seconds = 0.5
 ANSWERED = {"speak": "answered", "nod": "nodded", "shake": "shook their head", "point": "pointed", "act": "did it"}
 
 
-class ScriptLine(Struct):
+class SpokenLine(Struct):
     """A speech. told: what came of it, a line each."""
 
     who: str
@@ -40,7 +40,7 @@ def script(recording: Recording) -> str:
     """Write the script, a text with a paragraph for each speech."""
     robot, found = recording.robot, _Found(recording)
     lines = [*_speeches(found.spans("words", besides=robot), found.spans("speech", besides=robot))]
-    lines += _joined(ScriptLine(robot, each.begin, each.end, each.value) for each in found.of(robot, "speech"))
+    lines += _joined(SpokenLine(robot, each.begin, each.end, each.value) for each in found.of(robot, "speech"))
     lines.sort(key=lambda line: (line.begin, line.who))
     for line in lines:
         line.to = found.addressees(line.who, line.begin)
@@ -52,20 +52,20 @@ def script(recording: Recording) -> str:
     return "".join(f"{text}\n" for line in lines for text in _paragraph(line, found))
 
 
-def _speeches(words: dict[str, list[Annotation]], sounds: dict[str, list[Annotation]]) -> Iterator[ScriptLine]:
+def _speeches(words: dict[str, list[Annotation]], sounds: dict[str, list[Annotation]]) -> Iterator[SpokenLine]:
     """Speeches of people: what was understood, and what was heard and not understood."""
     for who in sorted({*words, *sounds}):
         understood = words.get(who, [])
         for each in understood:
-            yield ScriptLine(who, each.begin, each.end, each.value)
+            yield SpokenLine(who, each.begin, each.end, each.value)
         for each in sounds.get(who, []):
             if not any(one.begin - SAME < each.end and each.begin < one.end + SAME for one in understood):
-                yield ScriptLine(who, each.begin, each.end, "")
+                yield SpokenLine(who, each.begin, each.end, "")
 
 
-def _joined(lines: Iterable[ScriptLine]) -> Iterator[ScriptLine]:
-    """What the robot says without a pause is one paragraph, whatever blocks it was said by."""
-    last: ScriptLine | None = None
+def _joined(lines: Iterable[SpokenLine]) -> Iterator[SpokenLine]:
+    """Join what the robot says without a pause into one paragraph, whatever blocks it was said by."""
+    last: SpokenLine | None = None
     for line in lines:
         if last is not None and line.begin <= last.end + PAUSE:
             last.text, last.end = f"{last.text} {line.text}", line.end
@@ -78,7 +78,7 @@ def _joined(lines: Iterable[ScriptLine]) -> Iterator[ScriptLine]:
 
 
 def _answer(event: ConnectionEvent, robot: str) -> str:
-    """What was answered, in words; "": that is not known, or no answer is told here."""
+    """Say in words what was answered; "": that is not known, or no answer is told here."""
     by = event.answered_by or event.responder
     if event.kind == "backchannel":
         return f"{by} showed that they listen" + (f': "{event.words}"' if event.words else "")
@@ -90,7 +90,7 @@ def _answer(event: ConnectionEvent, robot: str) -> str:
     return f"{by} {ANSWERED[event.response]}{when}" + (f': "{event.words}"' if event.words and by != robot else "")
 
 
-def _paragraph(line: ScriptLine, found: "_Found") -> Iterator[str]:
+def _paragraph(line: SpokenLine, found: "_Found") -> Iterator[str]:
     to = f" to {_listed(line.to)}" if line.to else ""
     at, watched = found.looked_at(line), found.watched_by(line)
     looking = f", looking at {_listed(at)}" if at else ""
@@ -107,7 +107,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 class _Found:
-    """What a recording has of speeches, looks, addressees and answers."""
+    """Speeches, looks, addressees and answers of a recording."""
 
     def __init__(self, recording: Recording) -> None:
         self.robot = recording.robot
@@ -140,23 +140,23 @@ class _Found:
         yield from sorted(self._events.values(), key=lambda each: each[1])
 
     def addressees(self, who: str, begin: Seconds) -> tuple[str, ...]:
-        """To whom a speech was that began then, as it was known last."""
+        """Return to whom a speech was that began then, as it was known last."""
         near = [(abs(since - begin), -number, to) for number, (since, to) in enumerate(self._to.get(who, []))]
         return min(near)[2] if near and min(near)[0] <= SAME else ()
 
-    def looked_at(self, line: ScriptLine) -> tuple[str, ...]:
-        """What the speaker looked at, in order."""
+    def looked_at(self, line: SpokenLine) -> tuple[str, ...]:
+        """Return what the speaker looked at, in order."""
         looks = self.of(line.who, "gaze")
         seen = [each.value for each in looks if _shared(each, line) >= GLIMPSE and each.value != "away"]
         return tuple(dict.fromkeys(seen))
 
-    def watched_by(self, line: ScriptLine) -> tuple[str, ...]:
-        """Those who looked at the speaker for at least half of the speech."""
+    def watched_by(self, line: SpokenLine) -> tuple[str, ...]:
+        """Return those who looked at the speaker for at least half of the speech."""
         actors = sorted({tier.actor for tier in self._tiers} - {line.who})
         looks = {who: [each for each in self.of(who, "gaze") if each.value == line.who] for who in actors}
         shares = {who: sum(_shared(each, line) for each in looks[who]) for who in actors}
         return tuple(who for who, shared in shares.items() if 0 < line.end - line.begin <= 2 * shared)
 
 
-def _shared(one: Annotation, line: ScriptLine) -> Seconds:
+def _shared(one: Annotation, line: SpokenLine) -> Seconds:
     return max(0.0, min(one.end, line.end) - max(one.begin, line.begin))
