@@ -115,6 +115,27 @@ async def test_nobody_is_told_to_press_a_microphone_that_was_just_not_to_be_had(
 
 
 @needs_browser
+async def test_nobody_is_told_to_press_what_no_page_at_this_address_can_have(place: Place) -> None:
+    hint = "document.querySelector('.hint').textContent"
+    bare = "Object.defineProperty(navigator, 'mediaDevices', { value: undefined })"  # as by http from elsewhere
+    async with await open_hub("robot", connect=(place.endpoint,)) as hub, browser.at_port(place.port) as running:
+        ears, eyes = hub.join("hearing", "perception"), hub.join("eyes", "perception")
+        tell_settings(ears, "hearing", HearingConfig(recognizer="sphinx"))
+        ears.declare_alive()
+        eyes.declare_alive()
+        async with running.page() as page:
+            await page.call("Page.addScriptToEvaluateOnNewDocument", source=bare)
+            await page.go(place.stage)
+            await page.until("window.stage.state.talk.hears === 'words' && window.stage.state.talk.sees")
+            await sit(page)
+            await page.until(f"{hint} === 'Type what you want to say.'")
+            await page.value(LATER % 25_000)
+            await page.until(f"{hint} === 'Touch a piece to look at it.'")
+            await press(page, ".hold")
+            await page.until(f"{hint}.startsWith('There is no microphone: ')")
+
+
+@needs_browser
 async def test_where_no_words_are_understood_a_visitor_is_told_to_type_in_both_languages(place: Place) -> None:
     hint = "document.querySelector('.hint').textContent"
     async with await open_hub("robot", connect=(place.endpoint,)) as hub, opened(place) as page:

@@ -80,6 +80,7 @@ def test_a_file_that_begins_with_the_voice_is_heard_as_after_silence(engage: Eng
 def test_what_is_missing_is_told(engage: Engage, files: Path):
     (files / "1.txt").unlink()
     assert "write what is said in 1.wav into 1.txt" in engage("check-recognizer", "endpoint", files).err
+    assert "nowhere: No such file or directory" in engage("check-recognizer", "endpoint", files / "nowhere").err
     assert "no recognizer 'nobody'" in engage("check-recognizer", "nobody", files / "0.wav").err
     assert engage("check-recognizer", "whisper", files / "0.wav", "--model", files).code == 2
     (files / "empty").mkdir()

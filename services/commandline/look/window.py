@@ -121,7 +121,8 @@ async def served(
             if other:
                 tell(f"{called.removesuffix(': ')} from other machines: {abroad}{page}")
         if shown.host not in LOCAL:
-            seen = f"everybody who reaches {shown.host} sees all of this robot, and the people before it"
+            where = "this machine" if shown.host in ANY else shown.host
+            seen = f"everybody who reaches {where} sees all of this robot, and the people before it"
             seen += (
                 "" if keys else ", unencrypted, and browsers there give neither microphone nor voice: --https FILE"
             )

@@ -133,7 +133,7 @@ def _senses(options: Options, config: RobotConfig) -> tuple[str, ...]:
         return ()
     if is_file(config.hearing.source):
         reason, advice = (
-            "a file is over one day, and a robot is not",
+            "a file ends, and a robot goes on",
             "`engage run hearing --from FILE.wav` beside it",
         )
         raise InputRefused(Fault(reason=reason, where="--from", advice=advice))

@@ -125,6 +125,9 @@ def _median(values: Iterator[float | None]) -> float | None:
 
 def _spoken(given: list[Path]) -> Iterator[SpokenFile]:
     """Each file with its words. Raises InputRefused."""
+    for one in given:
+        with raised_as(InputRefused, OSError, one):
+            one.stat()
     for folder in filter(Path.is_dir, given):
         if not any(folder.glob("*.wav")):
             raise InputRefused(Fault(reason="there is no FILE.wav in it", where=str(folder)))

@@ -3,7 +3,7 @@
 // kind.wants: what the browser is asked for. kind.has: whether this browser has what that needs. kind.worker: the script of the worker that sends to the window,
 // and kind.isModule: as a module. kind.link: place of its link there. kind.begin: gets what is open (its stream and worker), the track, and what tells that it is on.
 // kind.end: gets what was open. session: gives that of the page's link to the window.
-// face.show: gets the state (off, asked, on), and news: what is to be told, made of words in a language, or null; isLacking: it could not be had since it was last pressed, or has ended by itself.
+// face.show: gets the state (off, asked, on), and news: what is to be told, made of words in a language, or null; isLacking: no page at this address can have it, it could not be had since it was last pressed, or it has ended by itself.
 // face.level: gets how strong what it gives is, 0 to 1, while it is on.
 export function device(kind, session, face) {
   let on = null; // what is open while it is on, or asked for
@@ -13,7 +13,7 @@ export function device(kind, session, face) {
 
   // Why no page at this address can have it, in words; null: it can.
   const lacking = () => (navigator.mediaDevices?.getUserMedia && kind.has() ? null : (words) => words.none(isSecureContext ? words.unable : words.plain));
-  const show = () => face.show({ state: on === null ? "off" : on.isOn ? "on" : "asked", news, isLacking });
+  const show = () => face.show({ state: on === null ? "off" : on.isOn ? "on" : "asked", news, isLacking: isLacking || lacking() !== null });
   function tell(what) {
     news = what;
     show();
