@@ -24,6 +24,15 @@ async def talk(robot):
     async with asyncio.TaskGroup() as group:
         group.create_task(work())
 """
+WAITS_FOR_THE_ENDED = """
+import asyncio
+done = []
+async def talk(robot):
+    if not done:
+        done.append(task := asyncio.create_task(asyncio.sleep(9)))
+        task.cancel()
+        await task
+"""
 
 
 def test_a_manager_is_written_where_there_is_none_and_read_as_it_is_then(
@@ -45,6 +54,7 @@ def test_a_manager_is_written_where_there_is_none_and_read_as_it_is_then(
         ("async def talk(robot): ...\nsay hello", "line 2"),
         ("import nothing_of_this_name", "No module named 'nothing_of_this_name'"),
         ("def talk(robot): ...", "there is no talk in it"),
+        ("async def talk(robot): ...\nraise SystemExit(3)", "it cannot be run: SystemExit: 3"),
         ('PHRASES = "hello"\nasync def talk(robot): ...', "PHRASES are no phrases"),
     ],
 )
@@ -77,6 +87,25 @@ async def test_a_manager_that_fails_is_told_and_begins_again_until_it_returns(
     assert ("ZeroDivisionError" in one, f"see {path}, line 6" in one) == (True, True)
     assert "has returned" in last
     assert asyncio.get_running_loop().time() - began == pytest.approx(2 * talk.AGAIN, abs=0.1)
+
+
+async def test_a_manager_that_waits_for_what_it_has_ended_itself_has_failed_and_one_that_is_ended_has_not(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "mine.py"
+    path.write_text(WAITS_FOR_THE_ENDED, encoding="utf-8")
+
+    await talk._managed(talk.read_manager(path), cast("Any", None))
+
+    failed, returned = capsys.readouterr().err.splitlines()
+    assert ("CancelledError" in failed, f"see {path}, line 8" in failed) == (True, True)
+    assert "has returned" in returned
+    path.write_text("import asyncio\nasync def talk(robot): await asyncio.sleep(9)", encoding="utf-8")
+    ended = asyncio.create_task(talk._managed(talk.read_manager(path), cast("Any", None)))
+    await asyncio.sleep(1)
+    ended.cancel()
+    await asyncio.wait([ended])
+    assert (ended.cancelled(), capsys.readouterr().err) == (True, "")
 
 
 def test_it_says_plainly_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -248,6 +248,14 @@ def test_the_german_rules_know_what_they_name_and_as_much_as_the_english_ones() 
         assert [each for each in phrases if talks.answer(each.upper()) != text] == []
 
 
+def test_a_rule_is_written_as_people_write_and_its_answer_as_well() -> None:
+    own = SmallTalk(
+        {("What's up? :)",): "Say {example}, or {examples}.", ("!",): "Hm.", ("C++",): "I am C."}, ("a", "b")
+    )
+    assert own.answer("what’s up") == own.answer("Well, what's up?") == "Say {example}, or {examples}."
+    assert (own.answer("C++"), own.answer("Hm!")) == ("I am C.", OTHERWISE)
+
+
 def test_it_understands_what_most_answer_to_its_greeting() -> None:
     assert {answer(words) for words in ("Fine, thanks! And you?", "I am good.", "Fine, thank you.")} == {
         answer("I am fine.")

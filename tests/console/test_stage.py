@@ -340,6 +340,34 @@ async def test_what_a_visitor_has_said_is_read_out_to_them_and_not_to_the_next(p
             assert await other.value(read) == ""
 
 
+CLOCKS = """import('./page/timed.js').then(({ timed }) => {
+  const [real, clock, rounded] = [window.WebSocket, performance.now, (seconds) => Math.round(10 * seconds) / 10];
+  let [socket, here] = [null, 0];
+  let stands = 0;
+  window.WebSocket = class { constructor() { socket = this; } };
+  performance.now = () => 1000 * here;
+  const link = timed("http://nowhere/", { patience: 0, ready: () => (stands += 1), ended() {} });
+  const told = %s.map(([asked, answered, now]) => {
+    here = answered;
+    socket.onmessage({ data: JSON.stringify({ asked, now }) });
+    return rounded(link.there(1000 * here));
+  });
+  window.WebSocket = real;
+  performance.now = clock;
+  return [told, stands];
+})"""
+"""What a link takes the window's clock for after each answer. Its times: asked and come by the page's, and told."""
+
+
+@needs_browser
+async def test_a_clock_that_jumps_is_followed_at_once_and_a_slow_answer_is_no_jump(place: Place) -> None:
+    quick, slow, slept, back = (1.0, 1.001, 101.0), (2.0, 2.4, 102.4), (3.0, 3.1, 163.0), (4.0, 4.1, 104.0)
+    async with opened(place) as page:
+        told, stands = await page.value(CLOCKS % json.dumps([quick, slow, slept, back]))
+        assert told == pytest.approx([101.0, 102.4, 163.0, 104.0], abs=0.11)
+        assert stands == 1
+
+
 @needs_browser
 async def test_what_becomes_of_who_does_nothing_and_what_a_visitor_is_told_first(place: Place) -> None:
     idle = "import('./stage/visit.js').then(({ visit }) => [5, 13, 25, 46, 61].map((idle) => visit(idle, %s).do))"

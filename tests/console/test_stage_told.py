@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from engage_hri import connect
 from engage_hri.services.bus.zenoh.hub import open_hub
+from engage_hri.services.console.web.seats import TASK
 from engage_hri.services.console.web.sessions import RELOADED
 from engage_hri.services.perception.hearing.config import HearingConfig
 from engage_hri.services.runtime.service import tell_settings
@@ -231,3 +233,20 @@ async def test_a_device_whose_link_was_away_for_long_is_on_again_by_itself_once_
         await page.value("void (window.ends = null)")
         await press(page, ".quick:nth-of-type(2)")  # a frame comes
         await page.until(f"window.asked === 2 && {light}")
+
+
+@needs_browser
+async def test_a_kiosk_asks_at_once_whether_somebody_is_still_there_when_the_task_of_the_robot_is_over(
+    place: Place,
+) -> None:
+    asks, does = "document.querySelector('.ask').open", "window.stage.state.talk.task"
+    async with opened(place, "&kiosk") as page:
+        async with await open_hub("robot", connect=(place.endpoint,)) as hub, connect(hub=hub, name=TASK):
+            await page.until(does)
+            await sit(page)
+            assert not await page.value(asks)
+        await page.until(f"!{does}")
+        await page.until(asks, 3)
+        await press(page, ".ask button")
+        await page.until(f"!{asks}")
+        assert await page.value(PERSON)

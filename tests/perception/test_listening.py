@@ -35,6 +35,8 @@ class Odd(SpeechRecognizer):
             raise OSError("no such file")
         if settings.model == "hangs":
             time.sleep(99)
+        if settings.model == "large":
+            time.sleep(1)
 
     def listen(self):
         return OddListening()
@@ -129,6 +131,28 @@ async def test_a_recognizer_that_freezes_costs_one_speech(
     assert failed.fault.reason == "the recognizer odd does not answer for 1 s"
     monkeypatch.setattr(listening, "LIMIT", 20.0)
     assert (await ear.said(2, 10))[-1] == KnownWords(2, SpeechWords("over"), True)
+    ear.work.close()
+
+
+async def test_one_that_loads_for_longer_than_words_may_take_is_there_again_after_it_was_lost(
+    odd: Callable[..., VoiceEar], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(listening, "LIMIT", 0.5)
+    ear = odd("large")
+    await ear.work.made()
+    assert isinstance((await ear.said(1, 7))[-1], NotUnderstood)
+
+    [failed] = await ear.said(2, 10)
+    assert isinstance(failed, NotUnderstood)
+    assert failed.fault.reason == "the recognizer odd begins anew, and is not there yet"
+    async with asyncio.timeout(30):
+        speech = 3
+        while isinstance(answer := (await ear.said(speech, 10))[-1], NotUnderstood):
+            assert answer.fault == failed.fault
+            speech += 1
+    assert ear.answers == [
+        KnownWords(speech, SpeechWords(told), final) for told, final in (("10", False), ("over", True))
+    ]
     ear.work.close()
 
 

@@ -1,6 +1,7 @@
 """Sound as numbers: files, rates, and when samples of a device were captured."""
 
 import io
+import os
 import random
 import wave
 
@@ -10,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from engage_hri.schemas.faults import InputRefused
+from engage_hri.services.perception.hearing.microphone import read_file
 from engage_hri.services.perception.hearing.sound import FOR, SampleClock, read_wav, resampled
 from engage_hri.services.perception.hearing.voice import RATE
 from tests.perception.spoken import write_wav
@@ -45,6 +47,17 @@ def test_what_is_no_wav_file_of_16_bits_is_refused_with_what_to_do():
         assert "ffmpeg" in refused.value.fault.advice
     with pytest.raises(InputRefused, match="8 bits, not 16"):
         read_wav(io.BytesIO(written(width=1)), "a.wav")
+    whole = written()
+    with pytest.raises(InputRefused, match="no WAV file that can be read"):
+        read_wav(io.BytesIO(whole[:17] + b"r" + whole[18:]), "a.wav")  # its head is longer than the file
+    with pytest.raises(InputRefused, match="there is no sound in it"):
+        read_wav(io.BytesIO(whole[:40] + bytes(4)), "a.wav")
+
+
+def test_a_pipe_is_refused_for_who_opens_it_may_wait_for_ever(tmp_path):
+    os.mkfifo(tmp_path / "pipe.wav")
+    with pytest.raises(InputRefused, match=r"pipe\.wav: it is no file"):
+        read_file(tmp_path / "pipe.wav", 1)
 
 
 def test_a_file_that_ends_before_its_end_is_refused_unless_nobody_knew_where_that_would_be():

@@ -99,9 +99,11 @@ class SmallTalk:
         parting: str = "Goodbye!",
         last: str = "or: ",
     ) -> None:
-        self._texts = {phrase.casefold(): text for phrases, text in rules.items() for phrase in phrases}
+        self._texts = {
+            plain: text for phrases, text in rules.items() for phrase in phrases if (plain := plain_words(phrase))
+        }
         self._next = cycle(examples)
-        self._wordless = "|".join(("(ha ?h?)+", *still))
+        self._wordless = "|".join(("(ha ?h?)+", *map(plain_words, still)))
         self._otherwise, self._several, self._silence = otherwise, several, silence
         self._shows, self._names, self._parting, self._last = shows, names or {}, parting, last
 
@@ -151,7 +153,7 @@ class SmallTalk:
 
         words: as they were understood, or typed. things: on the table.
         """
-        plain = " ".join(re.findall(r"[\w']+", words.casefold()))
+        plain = plain_words(words)
         if re.fullmatch(self._wordless, plain):
             return "[nod]"
         found = max((each for each in self._texts if re.search(rf"\b{each}\b", plain)), key=len, default="")
@@ -179,9 +181,9 @@ class SmallTalk:
         """
         if "{examples}" in text:
             *some, last = islice(self._next, 3)
-            text = text.format(examples=f"{', '.join(some)}, {self._last}{last}")
+            text = text.replace("{examples}", f"{', '.join(some)}, {self._last}{last}")
         if "{example}" in text:
-            text = text.format(example=next(self._next))
+            text = text.replace("{example}", next(self._next))
         match = re.fullmatch(r"(.*?[.!]?)\s*([^.!?]*\?)?", text)
         told, asked = match.groups() if match else (text, None)
         for words, index in ((told, turn_index), (asked, 1)):
@@ -204,6 +206,11 @@ class SmallTalk:
         if word == "look":
             return {"look": thing}
         return {"refer": bracket, **({"phrases": (self._names[bracket],)} if bracket in self._names else {})}
+
+
+def plain_words(text: str) -> str:
+    """The words of a text alone, of what is said as of what a rule awaits: phones write `wie geht’s?`."""
+    return " ".join(re.findall(r"[\w']+", text.casefold().replace("’", "'")))
 
 
 def is_form_of(word: str, own: str) -> bool:

@@ -210,7 +210,7 @@ def _run(path: Path) -> dict[str, Any]:
     """Run a file, for the names that it has then. Raises InputRefused."""
     try:
         return runpy.run_path(str(path))
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # a file that exits as it is read never gets to talk
         raise InputRefused(
             Fault(reason=f"it cannot be run: {words_of(error)}", where=str(path), advice=seen_at(error))
         ) from error
@@ -289,9 +289,15 @@ async def _talk(
 async def _managed(manager: ManagerFile, robot: Robot) -> None:
     """Run a manager until it returns. One that fails begins again, and the robot stays."""
     while True:
+        talking = asyncio.create_task(manager.talk(robot), name="manager's talk")
         try:
-            await manager.talk(robot)
-        except Exception as error:
+            await asyncio.wait([talking])
+        finally:
+            talking.cancel()
+            await asyncio.wait([talking])
+        try:
+            talking.result()
+        except (Exception, asyncio.CancelledError) as error:  # the latter is of its own, and not ours: we go on
             LOG.debug("the manager has failed", exc_info=error)
             cause = error
             while isinstance(cause, ExceptionGroup):

@@ -4,7 +4,7 @@ import { bar as bars } from "./bar.js";
 import { heads as atHeads } from "./heads.js";
 import { scene as space } from "./scene.js";
 import { touch as hands } from "./touch.js";
-import { moment, part, visit } from "./visit.js";
+import { ASK, moment, part, visit } from "./visit.js";
 import { another, language, texts } from "./words.js";
 
 const TOLD = 4; // seconds for which news of an order are shown
@@ -112,7 +112,10 @@ const link = follow({
     offset = offset === null || isFirst || behind < offset ? behind : offset + (behind - offset) * 0.002; // frames come late, never early
     const isBefore = !state.talk;
     if (frame.sections?.scene) state.scene = frame.sections.scene;
-    if (frame.sections?.talk) state.talk = frame.sections.talk;
+    if (frame.sections?.talk) {
+      if (isKiosk && state.talk?.task && !frame.sections.talk.task) idle = Math.min(idle, clock() - ASK); // goodbye is said: are they still there?
+      state.talk = frame.sections.talk;
+    }
     if (frame.you) {
       if (state.person && !frame.you.person && isFirst) note(state.text.gone, Infinity);
       if (state.person !== (frame.you.person ?? "")) at(".read").replaceChildren();

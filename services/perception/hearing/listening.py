@@ -133,12 +133,16 @@ class InThisProcess(Understanding):
 
 class InItsOwn(Understanding):
     """A recognizer in its own process. When that is lost, the speeches that it has not answered have failed, and the
-    next speech starts another one."""
+    next speech starts another one. What is said while it loads its model is kept for it, each speech for `LIMIT`."""
 
     def __init__(self, order: Order | DetectorOrder, on_answer: OnAnswer) -> None:
         self._order, self._on_answer = order, on_answer
         self._loop = asyncio.get_running_loop()
         self._child: PipedProcess | None = None
+        self._loading: asyncio.TimerHandle | None = None
+        """Time that is left to one that is not there yet; None: it is, or there is none."""
+        self._kept: list[SpeechOrder] = []
+        """Orders that wait until it is there."""
         self._answers = PackedMessages(Made | Answer)
         self._made: asyncio.Future[None] = self._loop.create_future()
         self._open: dict[int, asyncio.TimerHandle | None] = {}
@@ -148,11 +152,7 @@ class InItsOwn(Understanding):
 
     async def made(self) -> None:
         self._start()
-        try:
-            await asyncio.wait_for(asyncio.shield(self._made), MAKING)
-        except TimeoutError:
-            reason = f"{self._order.what} is not there after {MAKING:g} s"
-            raise InputRefused(Fault(reason=reason, where=self._order.WHERE)) from None
+        await asyncio.shield(self._made)
 
     def hear(self, speech: int, samples: bytes) -> None:
         if speech in self._failed:
@@ -162,9 +162,9 @@ class InItsOwn(Understanding):
         if self._child is None:
             return
         self._open.setdefault(speech, None)
-        self._child.write(packed_message(SpeechOrder(speech, samples)))
+        self._give(SpeechOrder(speech, samples))
         if not samples:
-            self._open[speech] = self._loop.call_later(LIMIT, self._lose, f"does not answer for {LIMIT:g} s")
+            self._open[speech] = self._loop.call_later(LIMIT, self._overdue, speech)
         elif self._child.unsent > MOST_UNREAD:
             self._lose("is too slow for speech")
 
@@ -172,16 +172,56 @@ class InItsOwn(Understanding):
         if self._child is not None:
             self._child.close()
             self._child = None
-        for timer in self._open.values():
+        for timer in (self._loading, *self._open.values()):
             if timer is not None:
                 timer.cancel()
+        self._loading = None
+        self._kept.clear()
         self._open.clear()
+
+    def _give(self, order: SpeechOrder) -> None:
+        """Send an order, or keep it until the recognizer is there."""
+        if self._loading is not None:
+            self._kept.append(order)
+        elif self._child is not None:
+            self._child.write(packed_message(order))
+
+    def _overdue(self, speech: int) -> None:
+        """Give up a speech for which it has had time enough, and the recognizer as well, if that has had it."""
+        if self._loading is None:
+            self._lose(f"does not answer for {LIMIT:g} s")
+            return
+        del self._open[speech]
+        self._kept = [order for order in self._kept if order.speech != speech]
+        self._fail(speech, self._fault("begins anew, and is not there yet"))
+
+    def _fail(self, speech: int, fault: Fault) -> None:
+        self._failed.append(speech)
+        self._on_answer(NotUnderstood(speech, fault))
+
+    def _fault(self, how: str) -> Fault:
+        return Fault(reason=f"{self._order.what} {how}", where=self._order.WHERE)
 
     def _start(self) -> None:
         self._answers = PackedMessages(Made | Answer)
         command = [sys.executable, "-m", "engage_hri.services.perception.hearing.listening"]
         self._child = PipedProcess(command, self._take, self._lose)
         self._child.write(packed_message(self._order))
+        self._loading = self._loop.call_later(MAKING, self._lose, f"is not there after {MAKING:g} s")
+
+    def _loaded(self) -> None:
+        """Let it have what was said meanwhile: its time begins now."""
+        assert self._loading is not None
+        self._loading.cancel()
+        self._loading, kept, self._kept = None, self._kept, []
+        for order in kept:
+            self._give(order)
+        for speech, timer in self._open.items():
+            if timer is not None:
+                timer.cancel()
+                self._open[speech] = self._loop.call_later(LIMIT, self._overdue, speech)
+        if not self._made.done():
+            self._made.set_result(None)
 
     def _take(self, more: bytes) -> None:
         for answer in self._answers.take(more):
@@ -191,8 +231,8 @@ class InItsOwn(Understanding):
         if isinstance(answer, Made):
             if answer.fault is not None:
                 self._lose("cannot be made", answer.fault)
-            elif not self._made.done():
-                self._made.set_result(None)
+            else:
+                self._loaded()
             return
         if isinstance(answer, NotUnderstood) or answer.final:
             timer = self._open.pop(answer.speech, None)
@@ -204,14 +244,13 @@ class InItsOwn(Understanding):
         self._on_answer(answer)
 
     def _lose(self, how: str, fault: Fault | None = None) -> None:
-        fault = fault or Fault(reason=f"{self._order.what} {how}", where=self._order.WHERE)
+        fault = fault or self._fault(how)
         lost = tuple(self._open)
         self.close()
         if not self._made.done():
             self._made.set_exception(InputRefused(fault))
         for speech in lost:
-            self._failed.append(speech)
-            self._on_answer(NotUnderstood(speech, fault))
+            self._fail(speech, fault)
 
 
 # -- its process ---------------------------------------------------------------------------------------------------

@@ -58,6 +58,9 @@ def read_file(path: Path, channels: int) -> Samples:
 
     channels: that it has to have at least; 1: the mean of all that it has, since a voice may be in any of them.
     """
+    if path.exists() and not path.is_file():  # a pipe may let us wait for ever
+        advice = "name a program that records as `hearing.source`, for example ffmpeg: docs/hearing.md"
+        raise InputRefused(Fault(reason="it is no file", where=str(path), advice=advice))
     with raised_as(InputRefused, OSError, path), path.open("rb") as file:
         samples = read_wav(file, str(path))
     if samples.shape[1] < channels:

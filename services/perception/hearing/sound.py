@@ -43,7 +43,7 @@ def read_wav(file: BinaryIO, name: str) -> Samples:
                 read.getnframes(),
             )
             content = read.readframes(count)
-    except (wave.Error, EOFError) as error:
+    except (wave.Error, EOFError, RuntimeError) as error:  # the last one: a part is longer than all of it
         reason = f"it is no WAV file that can be read: {str(error) or 'it ends too early'}"
         raise InputRefused(Fault(reason=reason, where=name, advice=ADVICE)) from error
     if width != 2:
@@ -55,7 +55,8 @@ def read_wav(file: BinaryIO, name: str) -> Samples:
     if len(content) < 2 * channels * count < UNKNOWN:
         reason = f"it ends after {there:.1f} s, and says that it has {said:.1f} s of sound"
         raise InputRefused(Fault(reason=reason, where=name, advice=ADVICE))
-    whole = len(content) - len(content) % (2 * channels)
+    if (whole := len(content) - len(content) % (2 * channels)) == 0:
+        raise InputRefused(Fault(reason="there is no sound in it", where=name, advice=ADVICE))
     samples = np.frombuffer(content[:whole], "<i2").reshape(-1, channels)
     return np.column_stack([resampled(samples[:, channel], rate) for channel in range(channels)])
 

@@ -2,6 +2,7 @@
 const ASKED = [0, 50, 100, 200, 400, 800]; // ms after the link is open at which the time is asked
 const EVERY = 500; // ms between two questions after that
 const KEPT = 40; // answers of which the quickest counts: 20 s
+const APART = 0.05; // seconds by which the clocks may drift apart meanwhile; what differs more has jumped: one of the machines was asleep
 const AGAIN = 1000; // ms from a broken link to the next try
 
 // address: of the WebSocket, as of a page. patience: ms for which a link that breaks without a word of the window is made again. ready: it stands, also again. heard: gets what
@@ -13,6 +14,7 @@ export function timed(address, { patience, ready = () => {}, heard = () => {}, b
   let answers = []; // how far the window's clock is ahead of ours, and how long the answer took, in seconds
   let answered = performance.now();
   let unheard = "";
+  const best = () => answers.reduce((one, other) => (other.took < one.took ? other : one));
 
   function open() {
     const own = (socket = new WebSocket(place));
@@ -29,9 +31,12 @@ export function timed(address, { patience, ready = () => {}, heard = () => {}, b
       const here = answered / 1000;
       const { asked, now, unheard: reason = "" } = JSON.parse(data);
       unheard = reason;
-      answers.push({ ahead: now - (asked + here) / 2, took: here - asked });
+      const isFirst = !answers.length;
+      const answer = { ahead: now - (asked + here) / 2, took: here - asked };
+      if (answers.length && Math.abs(answer.ahead - best().ahead) > (answer.took + best().took) / 2 + APART) answers = [];
+      answers.push(answer);
       if (answers.length > KEPT) answers.shift();
-      if (answers.length === 1) ready();
+      if (isFirst) ready();
     };
     own.onclose = ({ reason }) => {
       timers.forEach(clearInterval);
@@ -42,7 +47,7 @@ export function timed(address, { patience, ready = () => {}, heard = () => {}, b
     };
   }
   open();
-  const ahead = () => (answers.length ? answers.reduce((one, other) => (other.took < one.took ? other : one)).ahead : null);
+  const ahead = () => (answers.length ? best().ahead : null);
   return {
     get socket() {
       return socket;
