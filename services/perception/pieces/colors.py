@@ -1,11 +1,8 @@
 """Knowledge of a task before a picture is seen: its table, which its file tells, and the colors of its pieces."""
 
 from pathlib import Path
-from typing import Any
 
-import cv2
 import msgspec
-import numpy as np
 
 from engage_hri.schemas.advice import suggestion
 from engage_hri.schemas.faults import Fault, InputRefused, raised_as
@@ -15,30 +12,6 @@ from engage_hri.services.runtime.installation import TABLES, offers
 Palette = dict[str, tuple[float, float, float]]
 """Red, green and blue of each color, and of the table, under the same light."""
 TABLE = "table"
-SHADES = (1.15, 1.0, 0.86, 0.74, 0.63, 0.54, 0.46, 0.4, 0.34)
-"""Light of a pixel, as shares of that around it."""
-NOISE, TINT = 6.0, 0.07
-"""Deviation of a pixel from its color: of 255, and as a share."""
-
-
-def smoothed(flat: Any) -> Any:
-    """Smooth a picture as much as its colors are compared."""
-    return cv2.GaussianBlur(flat, (0, 0), 0.8)
-
-
-def deviations(pixels: Any, full: Any) -> Any:
-    """Deviations of pixels from a color, in the shade in which it is nearest. full: the color in the light there."""
-    least = np.full(len(pixels), np.inf, np.float32)
-    for shade in SHADES:
-        expected = np.minimum(full * np.float32(shade), 255)
-        spread = NOISE**2 + (TINT * expected) ** 2
-        least = np.minimum(least, summed((pixels - expected) ** 2 / spread))
-    return np.sqrt(least / 3)
-
-
-def summed(colors: Any) -> Any:
-    """Red, green and blue added: four times as fast as `sum`, whose loop is over these three."""
-    return colors[..., 0] + colors[..., 1] + colors[..., 2]
 
 
 def task_table(task: str) -> TaskTable:

@@ -14,7 +14,6 @@ import numpy as np
 
 from engage_hri.schemas.units import Meters
 from engage_hri.services.perception.eyes.looking import Floats
-from engage_hri.services.perception.pieces.colors import deviations, smoothed
 from engage_hri.services.perception.pieces.spotting import HEIGHT, SpottedHand
 
 COARSE = 4
@@ -39,8 +38,6 @@ SMOOTH = 1.5
 """Coarse pixels over which colors are compared in what may be a shadow: it is dark, and noise is not."""
 FINE = 2.0
 """Pixels over which a picture is smoothed where it is told what is hand and what is the table beside it."""
-OVERALL = 0.002
-"""Weight of how all of it looks in how a hand looks at a place, beside what is near."""
 
 
 class HandFinder:
@@ -68,11 +65,11 @@ class HandFinder:
         self._arms: list[Any] = []
         """What comes in over the edge in this picture."""
 
-    def cover(self, flat: Any, bare: Any, from_piece: Any) -> Any:
+    def cover(self, flat: Any, bare: Any, is_piece: Any) -> Any:
         """Find which pixels of the next picture hands and arms cover.
 
         flat: laid out, 0 where it sees nothing. bare: the same, as the bare table would look in the light around each
-        pixel. from_piece: deviations of each pixel from the color of a piece; infinite where it has none.
+        pixel. is_piece: which pixels have the color of a piece.
         """
         now, lit = (self._coarse(each) for each in (flat, bare))
         is_seen = self._is_table & (self._coarse((flat[..., 1] > 0).astype(np.float32)) > 0.99)
@@ -90,8 +87,7 @@ class HandFinder:
         if not self._arms:
             self._bare = lit
             return np.zeros(flat.shape[:2], bool)
-        fine = self._finely(flat, covered, max(DIFFERS, NOISY * noise))
-        fine &= ~self._is_held(flat, fine, from_piece)
+        fine = self._finely(flat, covered, max(DIFFERS, NOISY * noise)) & ~is_piece
         # Around a piece that is held colors mix: a line that is thinner than any finger.
         return cv2.morphologyEx(fine.astype(np.uint8), cv2.MORPH_OPEN, AROUND) > 0
 
@@ -132,27 +128,6 @@ class HandFinder:
         seen, bare = cv2.GaussianBlur(flat, (0, 0), FINE), cv2.resize(self._bare, size)
         is_table = (_away(seen, bare).max(2) < least) | _is_shadow(seen, bare)
         return (cv2.resize(coarse, size, interpolation=cv2.INTER_NEAREST) > 0) & ~is_table
-
-    def _is_held(self, flat: Any, fine: Any, from_piece: Any) -> Any:
-        """Find which pixels of what comes in are of a piece: nearer to its color than to that of the hand there.
-
-        Pale skin looks like a white piece in the shade, or a pink one. What the hand looks like is known from where
-        it has the color of no piece, and from the edge, over which a sleeve or an arm comes.
-        """
-        is_like, size = np.isfinite(from_piece) & fine, flat.shape[1::-1]
-        rim = cv2.resize(self._rim.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
-        weight = (fine & (~is_like | rim)).astype(np.float32)[..., None]
-        if not weight.any():
-            return is_like
-        soft = smoothed(flat)
-        small = cv2.resize(np.concatenate([soft * weight, weight], 2), self._size, interpolation=cv2.INTER_AREA)
-        near = (
-            cv2.GaussianBlur(small, (0, 0), LONG / self._step) + OVERALL * small.mean((0, 1)) / small[..., 3].mean()
-        )
-        color = cv2.resize(near[..., :3] / near[..., 3:], size, interpolation=cv2.INTER_LINEAR)
-        is_held = np.zeros(fine.shape, bool)
-        is_held[is_like] = from_piece[is_like] < deviations(soft[is_like], color[is_like])
-        return is_held
 
     def _hand(self, own: Any) -> SpottedHand:
         """The hand at the end of what comes in over the edge."""

@@ -125,21 +125,6 @@ def test_what_a_hand_holds_is_found_and_is_not_the_hand(skin: int):
     assert math.dist((found.x, found.y), (hand.at[0] - MIDDLE, y)) < 0.06
 
 
-@pytest.mark.parametrize("id", ["pink-triangle", "pink-square"])
-def test_what_a_hand_holds_that_looks_like_a_piece_is_told_where_it_is_or_not_at_all(id: str):
-    """Skin so pale is white in the shade, or pink: the fingers were part of the piece, 5 to 27 mm beside."""
-    looks, (x, y, turn) = finder(), (0.52, -0.1, 0.4)
-    hand = Hand((x + 0.1, y), above=0.03, skin=1)
-    looks.find(drawn(STARTS, seed=1))
-    seen = looks.find(drawn({**STARTS, id: (x, y, turn)}, light=Light(noise=8), hands=[hand], seed=1, take=1))
-
-    held = [math.dist((each.x, each.y), (x, y)) for each in seen.pieces if each.id == id]
-    assert all(away < 0.003 for away in held)
-    assert held or id == "pink-triangle"  # of which fingers hide a side
-    [found] = seen.hands
-    assert math.dist((found.x, found.y), (hand.at[0] - MIDDLE, y)) < 0.09
-
-
 def test_a_pale_hand_that_stays_does_not_become_the_table():
     """Its skin is like the wood in this light."""
     looks, hand = finder(), Hand((0.48, 0.21), above=0.03)
