@@ -112,17 +112,17 @@ class DerivedFeed(Feed[M]):
         return self._told.popleft()
 
     @property
-    @abstractmethod
     def _due(self) -> Seconds | None:
         """Local time at which something comes without a message; None: nothing does."""
+        return None
 
     @abstractmethod
     def _taken(self, received: Received) -> Iterable[M]:
         """Take a message."""
 
-    @abstractmethod
     def _passed(self) -> Iterable[M]:
         """Take the news that it is due."""
+        return ()
 
 
 class EventFeed(DerivedFeed[ConnectionEvent]):
@@ -161,10 +161,6 @@ class LevelFeed(DerivedFeed[Statistics]):
         self._names = PeopleNames()
         self._last: dict[str, Statistics] = {}
 
-    @property
-    def _due(self) -> None:
-        return None
-
     def _taken(self, received: Received) -> Iterable[Statistics]:
         message = received.message
         news: list[Statistics] = []
@@ -179,9 +175,6 @@ class LevelFeed(DerivedFeed[Statistics]):
         self._last |= {each.actor: each for each in news}
         return news
 
-    def _passed(self) -> Iterable[Statistics]:
-        return ()
-
 
 class StatisticsFeed(DerivedFeed[Statistics]):
     """Statistics of one person, by whatever id somebody knows them. Only the newest are kept."""
@@ -193,10 +186,6 @@ class StatisticsFeed(DerivedFeed[Statistics]):
         self._last: dict[str, Statistics] = {}
         """The newest of each person: the word that two ids are one may come after them."""
 
-    @property
-    def _due(self) -> None:
-        return None
-
     def _taken(self, received: Received) -> Iterable[Statistics]:
         message, name = received.message, self._names.name(self._actor)
         if isinstance(message, Statistics):
@@ -205,9 +194,6 @@ class StatisticsFeed(DerivedFeed[Statistics]):
         self._names.take(message)
         now = self._names.name(self._actor)
         return (self._last[now],) if now != name and now in self._last else ()
-
-    def _passed(self) -> Iterable[Statistics]:
-        return ()
 
 
 SAME_PATIENCE: Seconds = 0.2
