@@ -215,3 +215,17 @@ objects within one gaze are met by one look
 @each(STORIES)
 def test_a_claim_alone(story: Story) -> None:
     check(story)
+
+
+def test_the_head_is_not_sent_to_whom_the_world_has_lost_a_moment_ago_but_to_them_once_they_are_back() -> None:
+    stage = on_the_face()
+    stage.feed(world(speed=0.3))
+    stage.until(10.5)
+    stage.feed(world(person=False))  # the hand lies still
+    stage.until(12.2)
+    owner_while_away = stage.owner
+    stage.feed(world())
+    stage.until(13.0)
+
+    assert owner_while_away == "face"
+    assert [(at, target) for at, _, target in stage.shifts] == [(10.2, "hand"), (12.2, "human")]

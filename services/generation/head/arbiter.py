@@ -372,6 +372,9 @@ class Arbiter:
         owner, aim = self._owner, self._aim()
         if not aim.target or aim == self._base or self._lapsed is not None:
             return None
+        # Who was lost a moment ago still counts as present, so that the head stays on them; it cannot go there.
+        if self._scene.world is not None and self._scene.world.entity(aim.target) is None:
+            return None
         if self._failed is not None and aim == self._failed[0]:
             return None
         lies_over = owner.kind == "fragment" and self._fragments.gaze is not None
