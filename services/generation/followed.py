@@ -6,7 +6,7 @@ order.
 """
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from typing import ClassVar, Generic, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 from engage_hri.schemas.advice import suggestion
 from engage_hri.schemas.faults import Fault, InputRefused
@@ -47,6 +47,14 @@ def unknown(reason: str, name: str, names: Collection[str], where: str) -> Input
     """Refusal of a name that no policy has. names: those there are."""
     advice = suggestion(name, names) or f"one of {', '.join(names)}"
     return InputRefused(Fault(reason=reason, where=where, advice=advice))
+
+
+def checked(name: str, answer: Answer, kind: Any) -> Answer:
+    """Return what a policy answers. kind: what it has to be. Raises TypeError, within the question: it is no such."""
+    if not isinstance(answer, kind):
+        hint = "; is @property missing?" if callable(answer) else ""
+        raise TypeError(f"its {name} is of type {type(answer).__name__}, and not {kind}{hint}")
+    return answer
 
 
 class Followed(Generic[Kind]):

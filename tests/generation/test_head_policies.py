@@ -35,15 +35,10 @@ class Piece(HeadPolicy):
 
     before = "glance"
     FROM, TO = 20.0, 25.0
-
-    @property
-    def deadline(self) -> Seconds | None:
-        return next((at for at in (self.FROM, self.TO) if at > self.asked_at), None)
-
-    asked_at = 0.0
+    deadline = FROM
 
     def claim(self, now: Seconds, weaker: Sequence[Claim]) -> Claim | None:
-        self.asked_at = now
+        self.deadline = self.FROM if now < self.FROM else self.TO  # it says this for ever, also when it has passed
         return self.wish("piece", "its time") if self.FROM <= now < self.TO else None
 
 
@@ -114,6 +109,24 @@ def test_one_that_raises_is_dropped_and_noted_and_the_head_goes_on() -> None:
     ]
     breaking.until(21.0)
     assert breaking.owner == "piece"
+
+
+@pytest.mark.parametrize(
+    ("answers", "told"),
+    [
+        ({"deadline": lambda self: 1.0}, "its deadline is of type method, .*is @property missing"),
+        ({"claim": lambda self, now, weaker: "piece"}, "its claim is of type str"),
+        ({"sign": lambda self, now: "ann"}, "its sign is of type str"),
+    ],
+)
+def test_one_whose_answer_is_none_is_dropped_and_told(answers: dict[str, Callable[..., object]], told: str) -> None:
+    wrong = staged(wrong=type("Wrong", (HeadPolicy,), {**answers}))
+    wrong.until(1.0)
+
+    ((name, error),) = wrong.arbiter.policies.mistakes
+    assert name == "wrong"
+    assert re.match(told, str(error))
+    assert wrong.owner == "face"
 
 
 def test_a_mistake_of_ours_is_raised(monkeypatch: pytest.MonkeyPatch) -> None:

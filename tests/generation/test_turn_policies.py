@@ -94,6 +94,33 @@ def test_one_of_others_that_raises_is_dropped_and_noted_and_turns_go_on() -> Non
     assert turns.tick(3.0) is not None  # the human has left all the same
 
 
+@pytest.mark.parametrize("wrong", [lambda self, plan, fragment: 1 / 0, lambda self, plan, fragment: None])
+def test_one_of_others_that_cannot_amend_is_dropped_and_the_fragment_is_said(wrong: Callable[..., object]) -> None:
+    turns = RobotTurns("robot", GenerationConfig(), {"wrong": type("Wrong", (TurnPolicy,), {"amended": wrong})})
+
+    assert turns.accept(TurnFragment(id="a"), "human").addressee == "human"
+    assert [name for name, _ in turns.policies.mistakes] == ["wrong"]
+
+
+def test_a_limit_that_has_passed_and_ends_nothing_is_due_once() -> None:
+    asked: list[list[Hashable]] = []
+
+    class Keeps(TurnPolicy):
+        limits = {"six": 6.0}  # noqa: RUF012
+
+        def ending(self, now: Seconds, due: Collection[Hashable]) -> EarlyEnd | None:
+            asked.append([*due])
+            return None
+
+    turns = with_others(keeps=Keeps)
+    assert turns.deadline == 6.0
+    for at in (5.0, 6.0, 6.0, 7.0):
+        turns.tick(at)
+
+    assert asked == [[], ["six"], [], []]
+    assert turns.deadline is None
+
+
 @pytest.mark.parametrize("off", OWN)
 def test_each_can_be_off(off: str) -> None:
     assert [*arranged(OWN, {}, (off,))] == [name for name in OWN if name != off]

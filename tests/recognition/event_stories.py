@@ -25,11 +25,12 @@ The lines at the end say what becomes of every event, in the order in which they
 from collections.abc import Iterator
 from typing import Any
 
+from engage_hri.schemas.behaviors import EVENT_KINDS
 from engage_hri.schemas.recognition import ConnectionEvent
 from tests.recognition.observations import HUMAN, ROBOT, Log
 from tests.stories import Story, number
 
-KINDS = {"ap": "adjacency_pair", "dg": "directed_gaze", "mfg": "mutual_facial_gaze", "bc": "backchannel"}
+KINDS = {kind.prefix: name for name, kind in EVENT_KINDS.items()}
 NAMES = {
     "blue": "blue-square", "pink": "pink-square", "words": "block-1:speech-1", "next-words": "block-2:speech-1",
 }  # fmt: skip
@@ -118,6 +119,8 @@ def _take(log: Log, at: float, verb: str, *words: str) -> None:
             since = float(named.get("since", at))
             is_behavior = what == "speak" or ":" in "".join(plain[1:])
             about = {"behavior" if is_behavior else "target": plain[1] if plain[1:] else ""}
+            if act not in "+-~":
+                raise ValueError(f"{verb} {plain[0]}: an action begins with + or ~, or ends with -")
             if act == "~":
                 log.goes_on(verb, what, at, since, **about)  # type: ignore[arg-type]
             else:

@@ -13,6 +13,7 @@ home.
 """
 
 from collections.abc import Mapping
+from math import inf
 
 from msgspec import Struct
 
@@ -25,7 +26,7 @@ from engage_hri.schemas.units import Degrees, Probability, Radians, Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.bus.deadlines import Acquaintances
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.followed import Followed, arranged
+from engage_hri.services.generation.followed import Followed, arranged, checked
 from engage_hri.services.generation.head.orders import FragmentPolicy, InhibitionPolicy
 from engage_hri.services.generation.head.policies import OWN
 from engage_hri.services.generation.head.policy import HeadPolicy, RobotSign
@@ -151,6 +152,8 @@ class Arbiter:
             followed.append(policy)
         self.policies = Followed(followed)
         self._people = Acquaintances()
+        self._ruled: Seconds = -inf
+        """Time of the last ruling."""
         self._since: Seconds = 0.0
         self._waiting: tuple[Claim, ...] | None = None
         """Claims without the head; None before the first ruling, so that this counts as changed."""
@@ -265,16 +268,19 @@ class Arbiter:
 
     @property
     def deadline(self) -> Seconds | None:
-        due = self.policies.ask(lambda policy: policy.deadline)
-        due.append(self._failed[1] if self._failed else None)
+        asked = self.policies.ask(lambda policy: checked("deadline", policy.deadline, float | int | None))
+        # What was due by the last ruling counted there: a policy that still names it would have it ruled for ever.
+        due = [at for at in asked if at is not None and self._ruled < at < inf]
+        due += [self._failed[1]] if self._failed else []
         if self._stays_until is not None:
             due.append(self._stays_until)
         elif self._lapsed is not None:
             due.append(self._lapsed + DWELL)
-        return min((each for each in due if each is not None), default=None)
+        return min(due, default=None)
 
     def rule(self, now: Seconds) -> Ruling:
         """Decide on the owner by now, and on the gaze shift that takes the head to its target."""
+        self._ruled = now
         for person in self._people.forgotten(now):
             self._forget(person)
         claims = self._claims(now)
@@ -315,7 +321,7 @@ class Arbiter:
         claims: list[Claim] = []
 
         def ask(policy: HeadPolicy) -> None:
-            claim = policy.claim(now, claims)
+            claim = checked("claim", policy.claim(now, claims), Claim | None)
             if claim is not None:
                 claims[:] = [claim, *(each for each in claims if each.kind != claim.kind)]
 
@@ -388,7 +394,8 @@ class Arbiter:
     def _sign(self, now: Seconds) -> SignOrder | None:
         if self._owner.kind in (InhibitionPolicy.kind, FragmentPolicy.kind) or self._scene.has_turn:
             return None
-        if (sign := self.policies.first(lambda policy: policy.sign(now))) is None:
+        sign = self.policies.first(lambda policy: checked("sign", policy.sign(now), RobotSign | None))
+        if sign is None:
             return None
         self._scene.signed[sign.person] = now
         self._signs += 1

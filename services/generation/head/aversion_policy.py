@@ -49,7 +49,6 @@ class AversionPolicy(HeadPolicy):
         """Time until which the eyes do not leave this face."""
         self._plans = False
         """A long utterance of the robot has just begun."""
-        self._seen: Seconds = float("-inf")
 
     def feed(self, message: Observation, now: Seconds) -> None:
         if isinstance(message, Floor):
@@ -66,15 +65,13 @@ class AversionPolicy(HeadPolicy):
 
     @property
     def deadline(self) -> Seconds | None:
-        due = self._until if self._until is not None else self._next
-        return due if due is not None and due > self._seen else None
+        return self._until if self._until is not None else self._next
 
     @property
     def _next(self) -> Seconds | None:
         return max(self._due, self._attends_until) if self._due is not None else None
 
     def claim(self, now: Seconds, weaker: Sequence[Claim]) -> Claim | None:
-        self._seen = now
         face = weaker[0].target if weaker else ""
         place = self.scene.landmark
         awaits = self.scene.waits and self.scene.asked

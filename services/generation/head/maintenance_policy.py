@@ -214,7 +214,6 @@ class GlanceWatch(HeadPolicy):
         self._own: Counter[str] = Counter()
         """Number of the robot's glances in this session of recognition, by person; "": at all together."""
         self._until: Seconds | None = None
-        self._seen: Seconds = float("-inf")
         self.face = ""
         """Id of the person at whom a glance would look; empty: there is none."""
 
@@ -264,11 +263,9 @@ class GlanceWatch(HeadPolicy):
 
     @property
     def deadline(self) -> Seconds | None:
-        due = self._until if self._until is not None else self._due
-        return due if due is not None and due > self._seen else None
+        return self._until if self._until is not None else self._due
 
     def claim(self, now: Seconds, weaker: Sequence[Claim]) -> Claim | None:
-        self._seen = now
         self.face = next((claim.target for claim in weaker if claim.kind == FaceWatch.kind), "")
         wanted = now < self._until if self._until is not None else self._due is not None and now >= self._due
         if not wanted or not self.face:

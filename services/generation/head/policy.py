@@ -48,7 +48,7 @@ class HeadPolicy:
 
     @property
     def deadline(self) -> Seconds | None:
-        """Time of the next change of the claim without a message; None: there is none."""
+        """Time of the next change of the claim without a message; None, or one that has passed: there is none."""
         return None
 
     def claim(self, now: Seconds, weaker: Sequence[Claim]) -> Claim | None:

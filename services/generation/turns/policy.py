@@ -85,7 +85,7 @@ class TurnPolicy:
         """
 
     def amended(self, plan: TurnPlan, fragment: TurnFragment) -> TurnPlan:
-        """Return what a fragment adds to the conversation.
+        """Return what a fragment adds to the conversation; its words are its manager's.
 
         plan: what it adds by Table 3.1 and the policies that come after.
         fragment: as its manager has sent it.
@@ -94,7 +94,7 @@ class TurnPolicy:
 
     @property
     def limits(self) -> Mapping[Hashable, Seconds]:
-        """Times until which others may go on as they do, by names of its own. It has to drop one that has passed."""
+        """Times until which others may go on as they do, by names of its own."""
         return {}
 
     def ending(self, now: Seconds, due: Collection[Hashable]) -> EarlyEnd | None:

@@ -15,7 +15,7 @@ from engage_hri.schemas.requests import are_of_one_run
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.deadlines import Sight, Silences
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.followed import Followed, arranged
+from engage_hri.services.generation.followed import Followed, arranged, checked
 from engage_hri.services.generation.turns.interjections import Interjections
 from engage_hri.services.generation.turns.plan import TurnPlan, plan_turn
 from engage_hri.services.generation.turns.policies import OWN
@@ -55,6 +55,8 @@ class RobotTurns:
         self.policies = Followed(each(name, scene, config) for name, each in ordered.items())
         self._waits = Silences[tuple[str, Hashable]](scene.sight)
         """The `_limits`, since `tick` was called."""
+        self._passed: set[tuple[tuple[str, Hashable], Seconds]] = set()
+        """Limits that have passed, and end no turn: a policy that still names one is not asked for ever."""
         self._broken_off: Fault | None = None
         """Why the turn before was aborted; None: it was not."""
         self._delay_target = ""
@@ -125,8 +127,12 @@ class RobotTurns:
                 plan = replace(plan, interruptible=self._scene.open.interruptible)
             if plan.interruptible_after is None:
                 plan = replace(plan, interruptible_after=self._scene.open.interruptible_after)
-        for policy in reversed([*self.policies]):
-            plan = policy.amended(plan, fragment)
+
+        def amend(policy: TurnPolicy) -> None:
+            nonlocal plan
+            plan = checked("amended plan", policy.amended(plan, fragment), TurnPlan)
+
+        self.policies.ask(amend)
         self._scene.live[fragment.id] = plan
         self._delay_target = fragment.delay_target if fragment.delay else ""
         if status == "beginning":
@@ -199,7 +205,7 @@ class RobotTurns:
     @property
     def held(self) -> str:
         """The turn that waits, as until it is decided whether somebody interrupts it; "": none does."""
-        return self.policies.first(lambda policy: policy.held) or ""
+        return self.policies.first(lambda policy: checked("held", policy.held, str)) or ""
 
     def goes_on(self, fragment: str) -> bool:
         """True if a fragment has neither ended nor is its turn broken off."""
@@ -208,16 +214,22 @@ class RobotTurns:
     @property
     def _limits(self) -> dict[tuple[str, Hashable], Seconds]:
         """Times until which others may go on as they do, by policy and its name of them."""
-        told = self.policies.ask(lambda policy: [((policy.name, each), at) for each, at in policy.limits.items()])
-        return dict(limit for each in told for limit in each)
+
+        def limits(policy: TurnPolicy) -> dict[tuple[str, Hashable], Seconds]:
+            told = policy.limits.items()
+            return {(policy.name, each): checked("limit", at, float | int) for each, at in told}
+
+        return {name: at for each in self.policies.ask(limits) for name, at in each.items()}
 
     @property
     def deadline(self) -> Seconds | None:
-        return min((self._waits.standing(*each) for each in self._limits.items()), default=None)
+        return min((self._waits.standing(*each) for each in self._limits.items() - self._passed), default=None)
 
     def tick(self, now: Seconds) -> Aborted | None:
         """Abort the turn that a policy ends by `now`; None: none."""
-        limits = self._limits
+        named = self._limits
+        self._passed &= named.items()
+        limits = {name: at for name, at in named.items() if (name, at) not in self._passed}
         for name in [name for name in self._waits if name not in limits]:
             self._waits.clear(name)
         for name, at in limits.items():
@@ -225,7 +237,11 @@ class RobotTurns:
         due = [*iter(lambda: self._waits.due(now), None)]
 
         def ending(policy: TurnPolicy) -> EarlyEnd | None:
-            return policy.ending(now, [limit for name, limit in due if name == policy.name])
+            own = [name for name in due if name[0] == policy.name]
+            ended = checked("ending", policy.ending(now, [limit for _, limit in own]), EarlyEnd | None)
+            if ended is None:
+                self._passed.update((name, limits[name]) for name in own)
+            return ended
 
         ended = self.policies.first(ending)
         return self._abort(*ended) if ended is not None else None
