@@ -379,7 +379,7 @@ class Arbiter:
         if not aim.target or aim == self._base or self._lapsed is not None:
             return None
         # Who was lost a moment ago still counts as present, so that the head stays on them; it cannot go there.
-        if self._scene.world is not None and self._scene.world.entity(aim.target) is None:
+        if self._scene.sight.is_missed(aim.target):
             return None
         if self._failed is not None and aim == self._failed[0]:
             return None

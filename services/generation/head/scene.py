@@ -86,6 +86,10 @@ class PeopleInSight:
     def is_face(self, target: str) -> bool:
         return target in self._here or target in self._lost
 
+    def is_missed(self, person: str) -> bool:
+        """True if the world has told of them and does no longer."""
+        return person in self._lost and person not in self._people
+
 
 class HeadScene:
     """Knowledge that the policies share. Each of them may read it; what is one policy's alone stays with that.
