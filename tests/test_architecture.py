@@ -82,7 +82,7 @@ LAYERS = {
     " > block exchange head > references turns > followed inhibitions > config",
     "services/realizer": "service > perform > export together > report > decide > foresee > plan > net"
     " > config points",
-    "services/recognition": "service > former_life intake > recognizer > perceive statistics > events > config",
+    "services/recognition": "service > intake > recognizer > perceive statistics > events > config",
 }
 """What lies above what within a folder: its files and folders by name, `*` for all others. Each may import what
 stands further right, and nothing beside it or further left."""
