@@ -13,6 +13,7 @@ import re
 import subprocess
 import traceback
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -236,8 +237,12 @@ def is_long(path: Path, test: str, *, real_time: bool) -> bool:
     return name != SMOKE and (real_time or is_named)
 
 
+@cache
 def is_long_file(path: Path) -> bool:
-    """Whether all tests of this file, or folder, belong to the long share, as is known without loading it."""
+    """Whether all tests of this file, or folder, belong to the long share, as is known without loading it.
+
+    A file is read once: it is asked about for each of its tests.
+    """
     if not path.is_relative_to(TESTS) or path == TESTS / SMOKE:
         return False
     file = path.relative_to(TESTS)
