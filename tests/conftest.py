@@ -83,7 +83,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Mark the long share before `-m` is judged. Long files first: whoever gets the last ends soon after others."""
     for item in items:
         test = item.nodeid.partition("::")[2]
-        if is_long(item.path, test, real_time=item.get_closest_marker("real_time") is not None):
+        marks = {mark.name for mark in item.iter_markers()}
+        if is_long(item.path, test, real_time="real_time" in marks, each_bus="each_bus" in marks):
             item.add_marker("long")
     places = {config.rootpath / "tests" / name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: (places.get(item.path, len(places)), item.path))

@@ -41,17 +41,17 @@ class RecordedLives:
         self._inbox.close()
         await self._bus.leave()
 
-    def again(self, session: str) -> Again:
-        """The life of this session, done once more."""
+    def again(self, session: str, ledger: list[Taken] | None = None) -> Again:
+        """The life of this session, done once more. ledger: in place of its own."""
         clock = StepClock(self.lives[session][0].at.clock)
         life = Again(self._make(clock, session), clock, self._content)
-        for taken in self.lives[session]:
+        for taken in ledger or self.lives[session]:
             life.take(taken, lambda life, number: self._messages.get((life, number)))
         return life
 
 
-def changed_step(ledger: list[Taken], tag: str, **other: object) -> int:
-    """Change the first step that took an input of this type and led to something. Returns its number."""
+def changed_step(ledger: list[Taken], tag: str, **other: object) -> tuple[list[Taken], int]:
+    """The ledger with another first step that took an input of this type and led to something, and its number."""
 
     def is_meant(step: Step) -> bool:
         return bool(step.content and step.content["type"] == tag and step.led_to)
@@ -60,5 +60,5 @@ def changed_step(ledger: list[Taken], tag: str, **other: object) -> int:
     steps = list(ledger[place].steps)
     number = next(number for number, step in enumerate(steps) if is_meant(step))
     steps[number] = replace(steps[number], content=steps[number].content | other)
-    ledger[place] = replace(ledger[place], steps=tuple(steps))
-    return ledger[place].first + number
+    taken = replace(ledger[place], steps=tuple(steps))
+    return [*ledger[:place], taken, *ledger[place + 1 :]], taken.first + number

@@ -13,6 +13,7 @@ import re
 import subprocess
 import traceback
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,7 @@ LONG = {
     "control/reachy_mini/test_contract.py": "all laws on a driver that test_outages.py and others have in parts",
     "control/mujoco/test_beside.py": "another robot in physics; test_mujoco_contract.py has all laws",
     "control/mujoco/test_chosen_again.py": "whole fragments in physics",
+    "control/mujoco/test_described_contract.py": "another robot in physics; test_as_simulated.py has ours",
     "control/mujoco/test_faults.py": "each fault in physics; test_mujoco_contract.py has all laws",
     "control/mujoco/test_limits.py": "random faults in physics",
     "control/mujoco/test_small_robots.py": "other robots in physics; test_mujoco_contract.py has all laws",
@@ -117,6 +119,31 @@ LONG_TESTS = {
     "docs/test_making_pages.py": {
         "test_arrows_point_down_and_boxes_keep_apart": "it draws all pictures of the site",
     },
+    "hostile/test_docs.py": {
+        "test_the_example_of_the_page_runs": "all that hostile peers send; test_nothing_pending.py has them, too",
+    },
+    "perception/pieces/test_appendix_a.py": {
+        "test_both_find_the_same_on_tables_that_people_lay": "many tables are drawn and searched; the figure is, too",
+    },
+    "perception/pieces/test_finding.py": {
+        **{
+            f"test_all_pieces_are_found_to_millimetres_in_any_light[Light(strength={it}, noise=20, blur=0.8)]": "same"
+            for it in (1.5, 0.45)
+        },
+        "test_the_stated_spread_is_honest": "many pictures, counted",
+    },
+    "perception/pieces/test_hands.py": {
+        "test_a_piece_that_is_carried_before_a_slow_camera_is_an_act_of_who_carries_it": (
+            "a film is drawn and searched; the others of the file have the acts"
+        ),
+        **{
+            f"test_a_hand_is_found_where_it_is_whatever_its_skin[Light(strength=0.6, noise=15, blur=0.8)-{skin}]": (
+                "the same in less light"
+            )
+            for skin in range(4)
+        },
+        **{f"test_what_a_hand_holds_is_found_and_is_not_the_hand[{skin}]": "another skin" for skin in (1, 2, 3)},
+    },
     "perception/pieces/test_pieces.py": {
         "test_a_film_of_a_table_becomes_the_world": "a film is drawn, written and read",
     },
@@ -128,14 +155,27 @@ LONG_TESTS = {
         "test_a_recognizer_that_fails_is_told_and_the_speech_has_no_words": "without sound: test_recognizing.py",
         "test_the_voice_is_that_of_the_only_person_whom_others_tell_of": "minutes of sound",
     },
+    "perception/eyes/test_pictures.py": {
+        "test_a_rendered_person_is_found_and_faces_where_they_do[3]": "another person",
+        "test_a_rendered_person_is_found_and_faces_where_they_do[7]": "another person",
+    },
     "perception/eyes/test_placing.py": {
         "test_a_camera_is_found_by_the_sheet": "pictures of a sheet are drawn and searched",
+    },
+    "perception/test_lips.py": {
+        **{
+            f"test_it_is_that_of_whose_lips_go_with_it_and_hardly_ever_anothers[{case}]": "another voice"
+            for case in ("still-", "still-f3", "chews-f3", "smiles-", "smiles-f3")
+        },
     },
     "perception/test_pages_heard.py": {
         "test_a_flood_of_microphones_is_bounded_and_what_is_no_sound_of_ours_is_told": "so many microphones",
     },
     "perception/test_recognizing.py": {
         "TestSphinx": "speech of many voices through a model; test_hearing.py hears one",
+    },
+    "perception/test_voice.py": {
+        "test_onsets_and_ends_of_spoken_phrases_are_where_they_can_be_heard[10.0]": "with less noise",
     },
     "realizer/test_vocabulary.py": {
         "test_each_term_is_performed_degraded_or_dropped_as_the_page_says": "all words; conformance/ has the rules",
@@ -177,6 +217,7 @@ LONG_TESTS = {
     },
     "scenario/test_appendix_b.py": {
         "test_a_misplaced_piece_is_asked_to_be_fixed_and_then_is_right": "another whole task",
+        "test_totals_of_causes_turn_and_reference[object-gazes1]": "the task at the other resolution",
         "test_robot_initiated_events_come_in_the_order_and_with_the_outcomes_of_the_transcript[object]": (
             "the task at the other resolution; recognition/test_appendix_b.py has both without a robot"
         ),
@@ -200,11 +241,21 @@ LONG_TESTS = {
     "study/test_plots.py": {
         "test_all_plots_are_drawn": "it draws with Matplotlib",
     },
+    "tangram/collaboration/test_visitors.py": {
+        "test_who_looks_at_the_pieces_to_think_is_not_let_go": "minutes of a whole robot; who is let go is not long",
+        "test_who_attends_and_does_nothing_is_asked_for_another_piece": "minutes of a whole robot; help is not long",
+    },
     "test_shares.py": {
         "test_a_process_that_nobody_has_marked_is_red_and_what_is_left_out_is_told": "it runs pytest",
     },
 }
 """The same of single tests, classes of tests, or cases, by file."""
+
+LONG_BUSES = {
+    "group": "sessions of one process, with keys: they hear each other in memory; `zenoh` has the sockets",
+    "shared": "one session for a whole process; `memory` has what it does within, `zenoh` what it does outside",
+}
+"""Kinds of bus on which the contract of buses is long, with the reason."""
 
 SMOKE = "cli/test_smoke.py"
 """The one file of real processes that stays short: without it a robot that does not start at all would pass."""
@@ -228,16 +279,21 @@ SHORT_PROCESSES: dict[str, str] = {
 """Files of the short share that may start processes, with the reason."""
 
 
-def is_long(path: Path, test: str, *, real_time: bool) -> bool:
+def is_long(path: Path, test: str, *, real_time: bool, each_bus: bool = False) -> bool:
     """Whether a test belongs to the long share. test: its name in the file, perhaps with its case in brackets."""
-    name, whole = path.relative_to(TESTS).as_posix(), test.partition("[")[0]
+    name, (whole, _, case) = path.relative_to(TESTS).as_posix(), test.partition("[")
     named = {test, whole, whole.partition("::")[0]}
     is_named = is_long_file(path) or not named.isdisjoint(LONG_TESTS.get(name, ()))
-    return name != SMOKE and (real_time or is_named)
+    on_long_bus = each_bus and case.rstrip("]").partition("-")[0] in LONG_BUSES
+    return name != SMOKE and (real_time or is_named or on_long_bus)
 
 
+@cache
 def is_long_file(path: Path) -> bool:
-    """Whether all tests of this file, or folder, belong to the long share, as is known without loading it."""
+    """Whether all tests of this file, or folder, belong to the long share, as is known without loading it.
+
+    A file is read once: it is asked about for each of its tests.
+    """
     if not path.is_relative_to(TESTS) or path == TESTS / SMOKE:
         return False
     file = path.relative_to(TESTS)
@@ -250,7 +306,8 @@ def may_have_long(path: Path) -> bool:
     if path.is_dir() or not path.is_relative_to(TESTS):
         return True
     is_named = path.relative_to(TESTS).as_posix() in LONG_TESTS
-    return is_named or is_long_file(path) or (path != TESTS / SMOKE and "real_time" in path.read_text("utf-8"))
+    marked = re.search("real_time|each_bus", path.read_text("utf-8"))
+    return is_named or is_long_file(path) or (path != TESTS / SMOKE and marked is not None)
 
 
 def _is_importing() -> bool:

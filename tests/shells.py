@@ -2,7 +2,6 @@
 
 SHELLS = {
     "services/realizer/perform/performance.py",  # awaits bodies
-    "services/control/serving/state_publisher.py",  # publishes what the body shows
     "services/control/serving/questions.py",  # answers what behaviors would take
     "services/control/bases/driver_guard.py",  # times the calls of drivers by the clock of the loop
     "services/realizer/report.py",  # publishes feedback

@@ -82,10 +82,19 @@ LAYERS = {
     " > block exchange head > references turns > followed inhibitions > config",
     "services/realizer": "service > perform > export together > report > decide > foresee > plan > net"
     " > config points",
-    "services/recognition": "service > former_life intake > recognizer > perceive statistics > events > config",
+    "services/recognition": "service > intake > recognizer > perceive statistics > events > config",
 }
 """What lies above what within a folder: its files and folders by name, `*` for all others. Each may import what
 stands further right, and nothing beside it or further left."""
+_RANKS = [
+    (
+        folder,
+        tuple(folder.split("/")),
+        {name: rank for rank, names in enumerate(it.split(">")) for name in names.split()},
+    )
+    for folder, it in LAYERS.items()
+]
+"""Each of these folders, its parts, and the layer of each name in it."""
 ON_A_ROBOT = {"realizer", "generation", "recognition", "control"}
 THREADS = {"threading", "_thread", "concurrent", "multiprocessing"}
 THREAD_CALLS = {"to_thread", "run_in_executor", "Thread", "ThreadPoolExecutor"}
@@ -194,11 +203,9 @@ def _import(place: PurePosixPath, module: str) -> Iterator[str]:
 def _layering(place: PurePosixPath, module: str) -> Iterator[str]:
     """Where that goes up, or beside, in the folder that holds both."""
     here, there = place.with_suffix("").parts, tuple(module.split("."))
-    for folder, picture in LAYERS.items():
-        root = tuple(folder.split("/"))
+    for folder, root, rank in _RANKS:
         if here[: len(root)] != root or here[len(root)] in ("__init__", "__main__"):
             continue
-        rank = {name: number for number, layer in enumerate(picture.split(">")) for name in layer.split()}
         ours = here[len(root)] if "*" not in rank or here[len(root)] in rank else "*"
         if ours not in rank:
             yield f"{ours} has no place in the layers of {folder}"
@@ -261,10 +268,10 @@ def _imports(place: PurePosixPath, tree: ast.Module) -> Iterator[str]:
 
 
 def _imported(place: PurePosixPath, tree: ast.Module) -> Iterator[str]:
-    for node in _nodes(tree):
+    for node in _import_statements(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
+        else:
             base = place.parent.parts[: len(place.parent.parts) - node.level + 1] if node.level else ()
             module = ".".join([*base, *filter(None, [node.module])])
             yield module
@@ -277,9 +284,19 @@ def _tree(text: str) -> ast.Module:
 
 
 @lru_cache(maxsize=1)
+def _import_statements(tree: ast.Module) -> list[ast.Import | ast.ImportFrom]:
+    return [node for node in _nodes(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
+
+
+@lru_cache(maxsize=1)
 def _nodes(tree: ast.Module) -> list[ast.AST]:
-    """All nodes of a file, for which most rules ask one after the other. `ast.walk` takes twice as long."""
-    found: list[ast.AST] = [tree]
+    """All nodes of a file, for which most rules ask one after the other."""
+    return _below(tree)
+
+
+def _below(top: ast.AST) -> list[ast.AST]:
+    """The node and all below it. `ast.walk` takes twice as long."""
+    found = [top]
     for node in found:
         for value in vars(node).values():
             if isinstance(value, list):
@@ -414,10 +431,9 @@ def _members(of: ast.ClassDef) -> frozenset[str]:
     """Names of its methods and fields, those that its methods set too."""
     named = {each.name for each in of.body if isinstance(each, ast.FunctionDef | ast.AsyncFunctionDef)}
     named |= {ast.unparse(each.target) for each in of.body if isinstance(each, ast.AnnAssign)}
-    for each in ast.walk(of):
-        match each:
-            case ast.Attribute(value=ast.Name(id="self"), attr=name, ctx=ast.Store()):
-                named.add(name)
+    for each in _below(of):
+        if isinstance(each, ast.Attribute) and isinstance(each.ctx, ast.Store) and ast.unparse(each.value) == "self":
+            named.add(each.attr)
     return frozenset(named - {"__init__"})
 
 

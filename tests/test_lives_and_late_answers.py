@@ -22,6 +22,7 @@ from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.service import running
 from tests.cancelling import change_mind_often, whole_robot
 from tests.commanding import command
+from tests.random_cases import share_of
 from tests.realizer.fake_body import FakeBody, Script
 from tests.realizer.stage import stage
 
@@ -46,7 +47,7 @@ async def test_after_a_cancelled_request_the_next_one_comes_to_its_end(hub: Memo
     assert outcome.status == "done"
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(share_of(3)))
 async def test_so_it_does_after_cancellations_of_every_kind_at_any_moment(seed: int) -> None:
     async with whole_robot() as robot:
         await change_mind_often(robot, 40, seed)

@@ -68,8 +68,24 @@ def test_what_is_in_real_time_or_listed_is_long_but_for_the_smoke(
 
 
 @pytest.mark.parametrize(
+    ("test", "long"), [("test_it[memory]", False), ("test_it[zenoh-True]", False), ("test_it[group-True]", True)]
+)
+def test_the_contract_of_buses_is_long_on_all_but_memory_and_sockets(test: str, *, long: bool) -> None:
+    path = TESTS / "bus" / "test_contract.py"
+
+    assert is_long(path, test, real_time=False, each_bus=True) is long
+    assert not is_long(path, test, real_time=False)
+
+
+@pytest.mark.parametrize(
     ("name", "may"),
-    [("bus/test_cuts.py", True), ("bus/test_order.py", False), ("control/test_composed.py", True), ("lab", True)],
+    [
+        ("bus/test_cuts.py", True),
+        ("bus/test_contract.py", True),
+        ("bus/test_order.py", False),
+        ("control/test_composed.py", True),
+        ("lab", True),
+    ],
 )
 def test_for_the_long_share_only_files_are_loaded_that_may_have_some_of_it(name: str, may: bool) -> None:
     assert may_have_long(TESTS / name) is may

@@ -70,22 +70,26 @@ class Followed(Generic[Kind]):
 
     def ask(self, question: Callable[[Kind], Answer]) -> list[Answer]:
         """Ask all, the weakest first, or tell them. A mistake of ours is raised, one of others is noted."""
-        return [answer for policy in self._policies[::-1] for answer in self._asked(policy, question)]
+        answers = []
+        for policy in self._policies[::-1]:
+            try:
+                answers.append(question(policy))
+            except Exception as error:
+                self._drop(policy, error)
+        return answers
 
     def first(self, question: Callable[[Kind], Answer | None]) -> Answer | None:
         """Ask one after the other, the strongest first, until one has an answer."""
         for policy in [*self._policies]:
-            for answer in self._asked(policy, question):
-                if answer:
+            try:
+                if answer := question(policy):
                     return answer
+            except Exception as error:
+                self._drop(policy, error)
         return None
 
-    def _asked(self, policy: Kind, question: Callable[[Kind], Answer]) -> tuple[Answer, ...]:
-        try:
-            return (question(policy),)
-        except Exception as error:
-            if type(policy).__module__.startswith("engage_hri."):
-                raise
-            self._policies.remove(policy)
-            self.mistakes.append((policy.name, error))
-            return ()
+    def _drop(self, policy: Kind, error: Exception) -> None:
+        if type(policy).__module__.startswith("engage_hri."):
+            raise error
+        self._policies.remove(policy)
+        self.mistakes.append((policy.name, error))

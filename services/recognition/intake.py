@@ -55,8 +55,7 @@ from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.machine import Mishap, PersonForgotten
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
 from engage_hri.services.recognition.events.scene import Worded
-from engage_hri.services.recognition.perceive.clock_errors import ClockErrors
-from engage_hri.services.recognition.perceive.clock_restarts import ClockRestarts
+from engage_hri.services.recognition.perceive.clocks import ClockErrors, ClockRestarts
 from engage_hri.services.recognition.perceive.identities import Identities, Join, Parting
 from engage_hri.services.recognition.perceive.words import TimedWords
 from engage_hri.services.recognition.recognizer import Perceived, Recognizer, Result

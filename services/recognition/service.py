@@ -1,20 +1,39 @@
-"""The recognition service: feeds recognition from the bus and publishes what comes out. It decides nothing."""
+"""The recognition service: feeds recognition from the bus and publishes what comes out. It decides nothing.
+
+States on the bus end with the process that told them, so that nobody could give them back to it. So the last ones are
+kept in a file for the next life (`FormerLife`, decision 0183).
+"""
 
 import asyncio
-from collections.abc import Callable
-from typing import TypeVar
+import os
+from collections.abc import Callable, Iterator
+from itertools import takewhile
+from pathlib import Path
+from typing import TypeVar, get_args
 
+import msgspec
 from msgspec import DecodeError, Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
-from engage_hri.schemas.recognition import RequestEvent, SignalTurn, session_of
+from engage_hri.schemas.messages import Message
+from engage_hri.schemas.recognition import (
+    ConnectionEvent,
+    OpenEvents,
+    RequestEvent,
+    SamePeople,
+    SignalTurn,
+    Statistics,
+    session_of,
+)
 from engage_hri.schemas.requests import Cancel
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.deadlines import LATE
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.former_life import FormerLife
 from engage_hri.services.recognition.intake import Intake, reads
+from engage_hri.services.recognition.statistics.tally import is_same_start
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.intake import (
     AnswerRequest,
@@ -114,3 +133,86 @@ class _Recognition:
                 fault = self._bus.failed(error, what)
                 if request and self.desk.is_live(request):
                     self.desk.refuse(request, fault)
+
+
+State = ConnectionEvent | Statistics | SamePeople | OpenEvents
+ORDER = get_args(State)
+"""Order in which they are recalled."""
+WINDOW: Seconds = RecognitionConfig().window
+
+
+class FormerLife:
+    """The last states of recognition, and its recent events. path: of the file; empty: nothing is kept.
+
+    window: length of the recent window.
+    """
+
+    def __init__(self, path: str, window: Seconds = WINDOW) -> None:
+        self._path = Path(path) if path else None
+        self._window = window
+        self._events: dict[str, ConnectionEvent] = {}
+        """Events of the recent window, by id: each as started, or as decided."""
+        self._kept: dict[str, bytes] = {}
+        """States of this life, by key: as they are in the file, or will be once all has been recalled."""
+        self._is_recalled = True
+
+    def recall(self) -> Iterator[State]:
+        """Read what a former life has kept: recent events, counts, who is the same, and then open pairs.
+
+        The file stays as it is until the last of it has been taken: until then nothing else has all of it, should
+        this life end now. Raises OSError or `msgspec.DecodeError` at once.
+        """
+        if self._path is None or not self._path.exists():
+            return iter(())
+        states = [msgspec.json.decode(line, type=State) for line in self._path.read_bytes().splitlines()]
+        return self._hand_over(sorted(states, key=lambda state: ORDER.index(type(state))))
+
+    def _hand_over(self, states: list[State]) -> Iterator[State]:
+        self._is_recalled = False
+        for state in states:
+            if isinstance(state, ConnectionEvent):
+                self._keep_event(state)
+            yield state
+        self._is_recalled = True
+
+    def keep(self, key: str, message: Message) -> None:
+        """Keep a state in place of the one before, or an event; other messages are not kept."""
+        if self._path is None:
+            return
+        if isinstance(message, ConnectionEvent):
+            self._keep_event(message)  # the state that has changed with it is told next, and written
+        elif isinstance(message, State):
+            self._kept[key] = msgspec.json.encode(message)
+            self._write(self._path)
+
+    def _keep_event(self, event: ConnectionEvent) -> None:
+        """Keep an event as it is counted: as decided, by its latest names."""
+        known = self._events.get(event.id)
+        if event.state == "completed":
+            return
+        if event.retold and known is not None:
+            event = replace(known, initiator=event.initiator, responder=event.responder)
+        elif event.retold:
+            self._drop([id for id, each in self._events.items() if is_same_start(each, event)])
+        self._events[event.id] = event
+        self._kept[event.id] = msgspec.json.encode(event)
+        until = event.at.seconds - self._window
+        left = takewhile(lambda each: each.started.seconds <= until, self._events.values())
+        self._drop([each.id for each in left])
+
+    def _drop(self, ids: list[str]) -> None:
+        for id in ids:
+            del self._events[id], self._kept[id]
+
+    def forget(self, keys: tuple[str, ...]) -> None:
+        """Keep no state of these keys any longer."""
+        if self._path is not None and [self._kept.pop(key) for key in keys if key in self._kept]:
+            self._write(self._path)
+
+    def _write(self, path: Path) -> None:
+        """Write all states, once all have been recalled. Who is killed meanwhile leaves the file as it was."""
+        if not self._is_recalled:
+            return
+        whole = path.with_name(path.name + ".new")
+        whole.write_bytes(b"\n".join(self._kept.values()))
+        os.replace(whole, path)

@@ -17,9 +17,8 @@ from engage_hri.services.bus.interface import Bus
 from engage_hri.services.client.people.perceived_person import PerceivedActions
 from engage_hri.services.client.people.shared_world import SharedWorld
 from engage_hri.services.runtime.service import Ready
-from engage_hri.services.simulation.company import Company
+from engage_hri.services.simulation.company import AttentiveHuman, Company
 from engage_hri.services.simulation.human import FACE, Human, LookAt
-from engage_hri.services.simulation.listening import AttentiveHuman
 
 EXAMPLE = '{"entities": [{"id": "cup", "kind": "object", "position": [0.5, 0.1, 0.8], "category": "cup"}]}'
 ADVICE = f"for example {EXAMPLE}; places are in metres, at most {FARTHEST:.0e}"

@@ -54,7 +54,7 @@ VALUES = st.recursive(
 CALL = {"turn_status": "full", "parts": [{"say": "hi"}]}
 
 
-@settings(max_examples=share_of(100, 3))
+@settings(max_examples=share_of(100))
 @given(value=VALUES)
 @pytest.mark.parametrize("read", [fragment_in, block_in, call_in])
 def test_what_is_no_input_is_refused(read: Callable[[Any, str], object], value: Any) -> None:

@@ -230,9 +230,9 @@ async def test_a_step_that_took_something_else_is_noticed_and_named(hub: MemoryH
     record = await recorded(hub, 2)
     [(session, ledger)] = record.lives.items()
     tag = kind.__struct_config__.tag  # type: ignore[attr-defined]
-    changed = changed_step(ledger, tag, request="another")
+    other, changed = changed_step(ledger, tag, request="another")
 
-    first = record.again(session).differences[0]
+    first = record.again(session, other).differences[0]
 
     assert first.number == changed
     assert first.step.content["request"] == "another"

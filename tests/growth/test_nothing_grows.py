@@ -19,8 +19,7 @@ from engage_hri.services.recognition.events.limits import BLOCKS_KEPT
 from engage_hri.services.recognition.events.machine import INTERJECTIONS_KEPT, TEXTS_KEPT
 from engage_hri.services.recognition.events.scene import SPOKEN_KEPT
 from engage_hri.services.recognition.events.session import ACTIONS_KEPT, TURNS_KEPT
-from engage_hri.services.recognition.perceive.clock_errors import PEOPLE_KEPT
-from engage_hri.services.recognition.perceive.clock_restarts import REPORTERS_KEPT
+from engage_hri.services.recognition.perceive.clocks import PEOPLE_KEPT, REPORTERS_KEPT
 from engage_hri.services.recognition.perceive.identities import IDS_KEPT
 from engage_hri.services.recording.disk import FULL_CHUNK
 from engage_hri.services.recording.writing import MOST_CHANNELS

@@ -11,7 +11,7 @@ from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, 
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.perceive.attention import Attention
-from engage_hri.services.recognition.perceive.looks import DWELL
+from engage_hri.services.recognition.perceive.onsets import DWELL
 from tests.recognition.observations import HUMAN, ROBOT, stamp
 from tests.recognition.raw import EMPTY, EYES, PLACES, Watch, face, frames, piece, pose, table, turned
 

@@ -13,7 +13,7 @@ from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, EventS
 from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.bus.memory import MemoryBus, MemoryHub
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.perceive.clock_errors import KEPT, PEOPLE_KEPT, ClockErrors
+from engage_hri.services.recognition.perceive.clocks import KEPT, PEOPLE_KEPT, ClockErrors
 from engage_hri.services.recognition.service import recognize
 from engage_hri.services.recognition.statistics.tally import EventTally
 from engage_hri.services.runtime.service import running

@@ -5,7 +5,7 @@ import random
 import pytest
 
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.recognition.perceive.clock_restarts import IN_A_ROW, LATE, ClockRestarts
+from engage_hri.services.recognition.perceive.clocks import IN_A_ROW, LATE, ClockRestarts
 from tests.random_cases import share_of
 
 

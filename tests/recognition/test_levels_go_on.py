@@ -15,8 +15,8 @@ from engage_hri.schemas.recognition import ConnectionEvent, EventState, Statisti
 from engage_hri.schemas.units import Probability, Seconds, Stamp
 from engage_hri.schemas.world import World
 from engage_hri.services.recognition.config import HYSTERESIS, RecognitionConfig
-from engage_hri.services.recognition.former_life import FormerLife
 from engage_hri.services.recognition.intake import Content, Intake, Output
+from engage_hri.services.recognition.service import FormerLife
 from engage_hri.services.recognition.statistics import published
 from engage_hri.services.recognition.statistics.published import TOGETHER, PublishedStatistics
 from engage_hri.services.runtime.intake import Input, PublishMessage, StepClock

@@ -16,8 +16,8 @@ from engage_hri.services.recognition.events.machine import Mishap, UndefinedTran
 from engage_hri.services.recognition.events.mutual_facial_gaze import MutualFacialGaze
 from engage_hri.services.recognition.events.person import PersonRecognition
 from engage_hri.services.recognition.events.session import Session
-from engage_hri.services.recognition.perceive.looks import Looking
 from engage_hri.services.recognition.perceive.manipulation import Manipulation
+from engage_hri.services.recognition.perceive.onsets import Looking
 from engage_hri.services.recognition.recognizer import Recognizer
 from tests.random_cases import share_of
 from tests.recognition.observations import ROBOT, request_event, stamp, world

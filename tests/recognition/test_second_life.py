@@ -23,7 +23,7 @@ from engage_hri.schemas.units import Stamp
 from engage_hri.services.bus.interface import Bus
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.client.robot import connect
-from engage_hri.services.recognition.former_life import FormerLife
+from engage_hri.services.recognition.service import FormerLife
 from engage_hri.services.recognition.statistics.tally import EventTally
 from engage_hri.services.requests.ends import Requester
 from engage_hri.services.runtime.service import running

@@ -9,9 +9,8 @@ from engage_hri.schemas.blocks import BlockProgress
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, Utterance
 from engage_hri.schemas.units import Stamp
-from engage_hri.services.simulation.company import Bystander
+from engage_hri.services.simulation.company import AttentiveHuman, Bystander
 from engage_hri.services.simulation.human import FACE, Act, Grab, Lay, LookAt, Start, Stop
-from engage_hri.services.simulation.listening import AttentiveHuman
 from engage_hri.services.tangram.people.stochastic import requested_placement
 from engage_hri.services.tangram.table import tangram_table
 

@@ -12,9 +12,8 @@ from engage_hri.schemas.behaviors import BlockBehavior, Gaze
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
 from engage_hri.services.control.contract.body import Bell, MovementAuthority
-from engage_hri.services.control.motion.motion import Motion, MotionPlan, WalkPoint, is_shift
+from engage_hri.services.control.motion.motion import Motion, MotionPlan, Track, WalkPoint, is_shift
 from engage_hri.services.control.motion.path import Path
-from engage_hri.services.control.motion.track import Track
 
 FREEZE: Seconds = 0.5
 """Seconds that a part stands still when it is told to freeze, before it relaxes."""

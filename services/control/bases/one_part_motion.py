@@ -37,8 +37,7 @@ from engage_hri.services.control.contract.body import (
     MovementAuthority,
 )
 from engage_hri.services.control.contract.refusals import infeasible
-from engage_hri.services.control.motion.motion import MotionPlan, WalkPoint
-from engage_hri.services.control.motion.track import Track
+from engage_hri.services.control.motion.motion import MotionPlan, Track, WalkPoint
 
 Angles = Mapping[str, Radians]
 Way = Sequence[tuple[str, Angles]]

@@ -14,9 +14,8 @@ from engage_hri.schemas.world import World
 from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.figure.kinematics import Side
 from engage_hri.services.control.figure.repertoire import BUILT_IN, Repertoire
-from engage_hri.services.control.motion.motion import MotionPlan, WalkPoint
+from engage_hri.services.control.motion.motion import SAME, MotionPlan, Place, Trunk, WalkPoint
 from engage_hri.services.control.motion.path import Array, Leg
-from engage_hri.services.control.motion.track import SAME, Place, Trunk
 
 # -- aims ------------------------------------------------------------------------------------------------------------
 

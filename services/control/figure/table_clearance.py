@@ -23,9 +23,8 @@ from engage_hri.services.control.figure.course import TRUNK, UPRIGHT, Aim, Cours
 from engage_hri.services.control.figure.estimates import is_arm
 from engage_hri.services.control.figure.runs import Run
 from engage_hri.services.control.figure.tracks import LIFTS, PartTrack, are_clear, lifted
-from engage_hri.services.control.motion.motion import Motion
+from engage_hri.services.control.motion.motion import SAME, Motion, Trunk
 from engage_hri.services.control.motion.path import Leg, Path
-from engage_hri.services.control.motion.track import SAME, Trunk
 from engage_hri.services.runtime.steps import Steps
 
 APART: Radians = radians(4.0)

@@ -16,9 +16,8 @@ from engage_hri.schemas.units import Meters, Radians, Seconds
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import kinematics
 from engage_hri.services.control.figure.course import NECK, TRUNK, UPRIGHT, Aim, return_time, turning_time
-from engage_hri.services.control.motion.motion import Motion
+from engage_hri.services.control.motion.motion import Motion, Track, Trunk
 from engage_hri.services.control.motion.path import Array, JointMotion, Leg, Path
-from engage_hri.services.control.motion.track import Track, Trunk
 
 ALONG = np.linspace(0.0, 1.0, 17)
 """Shares of a path's length at which it is held against the table."""

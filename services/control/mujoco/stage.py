@@ -14,9 +14,8 @@ from engage_hri.schemas.body_faults import BodyFault
 from engage_hri.schemas.units import Meters, Radians, Seconds, Vector
 from engage_hri.schemas.world import Entity, World
 from engage_hri.services.control.figure.kinematics import LIMIT
-from engage_hri.services.control.motion.motion import Motion
+from engage_hri.services.control.motion.motion import Motion, Place, Track
 from engage_hri.services.control.motion.path import Leg, Path
-from engage_hri.services.control.motion.track import Place, Track
 from engage_hri.services.control.mujoco import faults, model
 from engage_hri.services.control.mujoco.model import THICKNESS
 from engage_hri.services.control.mujoco.physics import Array, Contact, Physics

@@ -24,9 +24,8 @@ from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure.course import Course
 from engage_hri.services.control.figure.estimates import phases
 from engage_hri.services.control.figure.kinematics import Mounting
-from engage_hri.services.control.motion.motion import Motion, WalkPoint, is_shift
+from engage_hri.services.control.motion.motion import Motion, Place, Track, WalkPoint, is_shift
 from engage_hri.services.control.motion.path import Array, JointMotion, Leg, Path, resting
-from engage_hri.services.control.motion.track import Place, Track
 from engage_hri.services.control.reachy_mini import courses, joints
 from engage_hri.services.control.reachy_mini.courses import Circumstances
 from engage_hri.services.control.reachy_mini.joints import Angles

@@ -43,9 +43,8 @@ from engage_hri.services.recognition.events.presence import NEVER
 from engage_hri.services.recognition.events.scene import Covered
 from engage_hri.services.recognition.perceive.attending import Attending
 from engage_hri.services.recognition.perceive.gaze_targets import AWAY, GazeTargets, Spread, is_direction, is_place
-from engage_hri.services.recognition.perceive.looks import ROUNDING, Change, Looking
 from engage_hri.services.recognition.perceive.manipulation import Manipulation, PersonChanges
-from engage_hri.services.recognition.perceive.speech import SpeechDetector
+from engage_hri.services.recognition.perceive.onsets import ROUNDING, Change, Looking, SpeechDetector
 from engage_hri.services.reports.action_reports import FACE_GRACE
 
 Raw = HeadPose | Looked | VoiceActivity | World | RobotState

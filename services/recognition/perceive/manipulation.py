@@ -16,7 +16,7 @@ from engage_hri.schemas.world import Entity, World
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.scene import Covering
 from engage_hri.services.recognition.perceive.gaze_targets import MEMORY
-from engage_hri.services.recognition.perceive.looks import ROUNDING, Change
+from engage_hri.services.recognition.perceive.onsets import ROUNDING, Change
 
 HAND_REACH: Meters = 0.1
 """Greatest distance from the center of a hand to that of a piece that it moves. Ours."""

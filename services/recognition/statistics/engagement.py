@@ -1,24 +1,65 @@
 """Estimate of engagement: contact and pace, with reasons, and a level that does not flutter. Thesis 2.3.
 
-Contact is what goes on: the share of the last seconds in which something was between the two (`contact`). Pace is
-what begins: the usual time between connection events over the recent one, or over the silence that goes on if that is
-longer; times the share of recent events that did not fail. What the robot has not answered is no failure of the
-person's (decision 0198). Silence is only that in which there is no contact either: who tells the robot a story begins
-nothing for a minute. While the person is busy with a task nothing is concluded from silence: that explains the 70 s
-gap of the canapé study. The estimate is the mean of the two, or the one that is known.
+Contact is what goes on: the share of the last seconds in which something was between the two (`ContactShare`). Pace
+is what begins: the usual time between connection events over the recent one, or over the silence that goes on if
+that is longer; times the share of recent events that did not fail. What the robot has not answered is no failure of
+the person's (decision 0198). Silence is only that in which there is no contact either: who tells the robot a story
+begins nothing for a minute. While the person is busy with a task nothing is concluded from silence: that explains
+the 70 s gap of the canapé study. The estimate is the mean of the two, or the one that is known.
 
 The levels are those of ROS4HRI: at the first sign of contact a person is `engaging`, and `engaged` only if they are
 still, or again, in contact a while later; who drifts away is `disengaging` first.
 """
 
-from math import inf
+from math import exp, inf
 from typing import Literal, NamedTuple
 
 from engage_hri.schemas.recognition import EngagementLevel, Statistics
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import HYSTERESIS, RecognitionConfig
-from engage_hri.services.recognition.statistics.contact import CONTACT_MEMORY, ContactShare
 from engage_hri.services.recognition.statistics.tally import EventTally
+
+CONTACT_MEMORY: Seconds = 8.0
+"""Time constant of the mean. Ours."""
+SETTLED: Probability = 0.01
+"""Difference from what goes on now below which the share counts as the same."""
+
+
+class ContactShare:
+    """Share of the last seconds in which something went on between one person and the robot: an exponential mean.
+
+    Who looks at the robot, speaks to it, or looks with it at a thing is in contact with it, though no event begins: a
+    story of a minute is one event. So the pace of beginnings alone would call the most engaged of all people
+    disengaged, and somebody who only glances back now and then engaged. What went on `CONTACT_MEMORY` seconds ago
+    counts for a third of what goes on now.
+    """
+
+    def __init__(self) -> None:
+        self.now: Probability | None = None
+        """How much of a contact there is now; None: nothing has told of it yet."""
+        self._share: Probability = 0.0
+        self._at: Seconds = -inf
+
+    def change(self, now: Probability | None, at: Seconds) -> None:
+        """Take how much of a contact there is from `at` on; None: that is not known any longer."""
+        self._share = (now or 0.0) if self.now is None else self.share(at)
+        self._at = max(at, self._at)
+        self.now = now
+
+    def resume(self, now: Probability | None, share: Probability, at: Seconds) -> None:
+        """Go on from what was known at `at`."""
+        self.now, self._share, self._at = now, share, at
+
+    def share(self, at: Seconds) -> Probability:
+        """Share of contact until `at`. It is 0 as long as nothing has told of contact."""
+        if self.now is None:
+            return 0.0
+        return self.now + (self._share - self.now) * exp(-max(0.0, at - self._at) / CONTACT_MEMORY)
+
+    def is_settled(self, at: Seconds) -> bool:
+        """True if the share no longer changes by time alone."""
+        return self.now is None or abs(self.share(at) - self.now) < SETTLED
+
 
 LEVELS: tuple[EngagementLevel, ...] = ("unknown", "disengaged", "engaging", "disengaging", "engaged")
 """From the least engaged to the most."""

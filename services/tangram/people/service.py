@@ -14,8 +14,8 @@ from engage_hri.services.bus.interface import Bus, Subscription
 from engage_hri.services.client.people.perceived_person import PerceivedActions, free_seat
 from engage_hri.services.client.people.shared_world import SharedWorld
 from engage_hri.services.runtime.service import Ready, tell_settings
+from engage_hri.services.simulation.company import AttentiveHuman, ListeningHuman
 from engage_hri.services.simulation.human import Human
-from engage_hri.services.simulation.listening import AttentiveHuman, ListeningHuman
 from engage_hri.services.simulation.party import NAMES, Party
 from engage_hri.services.simulation.still import show_company, table_world
 from engage_hri.services.tangram.people.appendix_b import misplacing_rules, rules

@@ -23,6 +23,7 @@ from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.tables import SIDES, poses_touching
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.simulation.chance import Chance, Delays
+from engage_hri.services.simulation.company import COMES, GOES, moves
 from engage_hri.services.simulation.human import (
     FACE,
     TABLE,
@@ -41,7 +42,6 @@ from engage_hri.services.simulation.human import (
     Withdraw,
     speech,
 )
-from engage_hri.services.simulation.listening import COMES, GOES, moves
 from engage_hri.services.tangram.table import TangramTable
 
 # -- habits -------------------------------------------------------------------------------------------------------

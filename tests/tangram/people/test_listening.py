@@ -8,8 +8,8 @@ from engage_hri.schemas.blocks import BlockProgress
 from engage_hri.schemas.body import WordSpoken
 from engage_hri.schemas.perception import ActionBegan, ActionEnded
 from engage_hri.schemas.units import Stamp
+from engage_hri.services.simulation.company import ListeningHuman
 from engage_hri.services.simulation.human import Act, Human, Lay, Leave
-from engage_hri.services.simulation.listening import ListeningHuman
 from engage_hri.services.tangram.people.stochastic import requested_placement
 from engage_hri.services.tangram.table import tangram_table
 
