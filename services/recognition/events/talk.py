@@ -232,7 +232,10 @@ class Talk(KindRecognizer):
         if not speech.is_heard or speech.is_noise:
             self._has_news(speech, at)
         known, is_in_time = speech.words, self._is_in_time(speech, at)
-        self.take_early(since if is_in_time else at, lambda talk: self._judge(talk, speech, known, at))
+        if is_in_time:
+            self.take_early(since, lambda talk: self._judge(talk, speech, known, at))
+        else:
+            self._take_in_order(at, lambda talk: self._judge(talk, speech, known, at))
         self.go_on(at)
 
     def _is_in_time(self, speech: OwnSpeech, at: Seconds) -> bool:
@@ -240,22 +243,25 @@ class Talk(KindRecognizer):
 
         They have been waited for, in line or by the conversation; it does not wait in line for those of who is alone.
         """
-        is_waited_for = bool(speech.company) or self._conversation.listener.listens_to(speech.part)
+        is_in_line = bool(speech.company) and any(each is speech for _, each in self._line)
+        is_waited_for = is_in_line or self._conversation.listener.listens_to(speech.part)
         over = (at if speech.until is None else speech.until) + WORDS_AFTER if speech.is_beside else speech.since
         return is_waited_for and at <= max(speech.since + WORDS_WAIT, over) + ROUNDING
 
     def _judge(self, talk: Dialogue, speech: OwnSpeech, words: str, at: Seconds) -> None:
-        """Take the words of a speech in their turn; if they decide nothing they are told all the same."""
+        """Take the words of a speech in their turn; if they decide nothing they are told all the same.
+
+        Of what nothing has been told they make speech, unless either has spoken since: what waits in line is told by now.
+        """
         speech.part.words = words or speech.part.words
         talk.understand(speech.part, at)
         self._writer.interject_again(self.id, speech.since, at)
-        if (
-            speech.is_noise
-            and speech.is_heard
-            and says_words(speech.words)
-            and self._scene.is_last(self.id, speech.since)
-        ):
-            speech.is_noise = False  # its words come late, beside a gesture that was told
+        is_heard, is_speech = speech.is_heard, says_words(speech.words)
+        is_new = speech.is_noise and is_speech if is_heard else speech.is_to(self._scene.robot)
+        if is_new and self._scene.is_last(self.id, speech.since, at):
+            if not is_heard:  # else it is beside a gesture that was told
+                talk.exchange.take(speech.part)
+            speech.is_noise, speech.is_heard = False, True
             self._scene.floor_changes += 1
 
     def _has_news(self, speech: OwnSpeech, at: Seconds) -> None:
@@ -270,14 +276,13 @@ class Talk(KindRecognizer):
             speech.part.taken_for = ""
         elif not speech.is_heard and not any(each is speech for _, each in self._line):
             is_over_sign = speech.until is not None and (speech.is_into_turn or speech.is_beside)
-            speech.is_noise, speech.is_heard = is_over_sign, True
             speech.part.until = speech.until
             if speech.until is None:
+                speech.is_heard = True
                 self.take_early(speech.since, lambda talk: talk.speaks(speech.part, beside=speech.is_beside))
             elif is_over_sign:
+                speech.is_noise, speech.is_heard = True, True
                 speech.part.taken_for = "noise"  # as such it is judged by its words
-            elif self._scene.is_last(self.id, speech.since):  # what either has said since may wait in line
-                self.take_early(speech.since, lambda talk: talk.exchange.take(speech.part))
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         """Take the person's leaving: nothing waits any longer."""
@@ -469,7 +474,7 @@ class Talk(KindRecognizer):
             is_sign = self._conversation.listener.listens_to(speech.part)
             speech.is_open &= is_sign
             if not is_sign:
-                self.speeches.is_no_noise(speech)
+                self._scene.is_no_noise(speech, self._writer.now)
 
     def _decide(self, speech: OwnSpeech, at: Seconds) -> None:
         """Decide what the sound is, by what was known when it was due: nothing, or to whom it is."""
@@ -479,7 +484,7 @@ class Talk(KindRecognizer):
         is_noise = is_judged_here and speech.may_be_noise and speech.until is not None
         speech.is_decided = True
         if is_judged_here:
-            self.speeches.is_no_noise(speech)
+            self._scene.is_no_noise(speech, at)
         if is_noise:
             speech.is_noise, speech.is_open, speech.to = True, False, NOBODY
             self._writer.decide_interjection(self.id, speech.since, "noise", at)
@@ -493,11 +498,14 @@ class Talk(KindRecognizer):
         return self.speeches.likely(speech, at, frozenset((self._scene.robot,)) if waits else NOBODY)
 
     def may_go_on(self, now: Seconds) -> bool:
-        """True if it is decided by `now` to whom the first speech in line is, or if what is decided may be told."""
+        """True if it is decided before `now` to whom the first speech in line is, or if what is decided may be told.
+
+        What is due in this very instant waits for all that happens in it: who is silent then has not gone on.
+        """
         if not self._line:
             return False
         speech = self._undecided_first()
-        return not self._is_behind_others() if speech is None else self._decided_at(speech) <= now
+        return not self._is_behind_others() if speech is None else self._decided_at(speech) < now - ROUNDING
 
     def go_on(self, now: Seconds) -> None:
         """Tell all in line up to the next speech of which it is not known to whom it is."""
