@@ -18,7 +18,7 @@ from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import HeadOwner
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, TurnOutcome
+from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, Interjection, RequestEvent, SignalTurn, TurnOutcome
 from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
@@ -27,7 +27,7 @@ from engage_hri.services.recognition.events.addressing import WHOEVER, WORDS_AFT
 from engage_hri.services.recognition.events.exchange import TURN_PATIENCE
 from engage_hri.services.recognition.events.history import ActionHistory, Latest
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock, anchor
-from engage_hri.services.recognition.events.machine import Effect, EventWriter, Mishap, OngoingEvent
+from engage_hri.services.recognition.events.machine import Effect, EventWriter, Mishap, OngoingEvent, SpeechStart
 from engage_hri.services.recognition.events.people import People
 from engage_hri.services.recognition.events.person import Part, PersonRecognition
 from engage_hri.services.recognition.events.scene import Covered, SessionScene, Worded
@@ -212,6 +212,10 @@ class Session:
             lambda person: person.talk.take(at, lambda talk: talk.exchange.pair.resume(event, at, by_robot=by_robot)),
         )
         return self._take()
+
+    def remember(self, told: Interjection) -> None:
+        """Take that a former life has told this, so that it is not told again."""
+        self._writer.interjected[SpeechStart(told.actor, told.since.seconds)] = told
 
     def lose_track(self, person: str, at: Seconds) -> list[Effect]:
         """Begin anew with this person after a failure: its open events end as lost."""
