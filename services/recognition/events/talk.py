@@ -231,22 +231,16 @@ class Talk(KindRecognizer):
         self.speeches.hear(speech, words, told, at)
         if not speech.is_heard or speech.is_noise:
             self._has_news(speech, at)
-        known, is_in_time = speech.words, self._is_in_time(speech, at)
-        if is_in_time:
+        known, over = speech.words, (at if speech.until is None else speech.until) + WORDS_AFTER
+        is_in_time = at <= max(since + WORDS_WAIT, over if speech.is_beside else since) + ROUNDING
+        # What has been waited for was known when the speech began; for the words of who is alone the line does not wait.
+        if is_in_time and speech.company and any(each is speech for _, each in self._line):
+            speech.part.words = known
+        elif is_in_time and self._conversation.listener.listens_to(speech.part):
             self.take_early(since, lambda talk: self._judge(talk, speech, known, at))
         else:
             self._take_in_order(at, lambda talk: self._judge(talk, speech, known, at))
         self.go_on(at)
-
-    def _is_in_time(self, speech: OwnSpeech, at: Seconds) -> bool:
-        """True if words into the robot's words, known at `at`, count as known when the speech began.
-
-        They have been waited for, in line or by the conversation; it does not wait in line for those of who is alone.
-        """
-        is_in_line = bool(speech.company) and any(each is speech for _, each in self._line)
-        is_waited_for = is_in_line or self._conversation.listener.listens_to(speech.part)
-        over = (at if speech.until is None else speech.until) + WORDS_AFTER if speech.is_beside else speech.since
-        return is_waited_for and at <= max(speech.since + WORDS_WAIT, over) + ROUNDING
 
     def _judge(self, talk: Dialogue, speech: OwnSpeech, words: str, at: Seconds) -> None:
         """Take the words of a speech in their turn; if they decide nothing they are told all the same.
