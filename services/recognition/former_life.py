@@ -43,7 +43,7 @@ class FormerLife:
         self._is_recalled = True
 
     def recall(self) -> Iterator[State]:
-        """Read what a former life has kept: recent events, counts, who is the same, what was said, and then open pairs.
+        """Read what a former life has kept: recent events, counts, who is the same, words, and then open pairs.
 
         The file stays as it is until the last of it has been taken: until then nothing else has all of it, should
         this life end now. Raises OSError or `msgspec.DecodeError` at once.

@@ -162,9 +162,9 @@ def _answered(speech: Span, before: Timeline) -> str:
         if speech.who in turn.to:
             heard += [(until[0], since[0], ROBOT, "") for since, until in turn.speech]
     for each in before.spans:
-        if each.action == "speak" and not is_noise(each, before) and speech.who in (each.who, each.to):
-            if _is_known_by(each, speech, before):
-                heard.append((each.until[0], each.since[0], each.who, each.to))
+        is_speech = each.action == "speak" and not is_noise(each, before) and speech.who in (each.who, each.to)
+        if is_speech and _is_known_by(each, speech, before):
+            heard.append((each.until[0], each.since[0], each.who, each.to))
     recent = [
         (min(until, at), since, who, to) for until, since, who, to in heard if since < at <= until + LIMIT + ROUND
     ]

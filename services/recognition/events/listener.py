@@ -216,12 +216,13 @@ class Listener:
         if not parts:
             return
         told = ListenerSign(parts)
-        self._backchannel.speaks(
+        self._backchannel.begin(
             OngoingEvent(
                 kind="backchannel", initiator=self._scene.robot, responder=self._id, started=told.since,
                 confidence=told.confidence,
                 spoken=tuple(SpeechStart(self._id, speech.since) for speech in told.speeches),
-            )
+            ),
+            "speaks",
         )  # fmt: skip
         self._backchannel.ends(until if told.until is None else told.until)
         for speech in sign.speeches:

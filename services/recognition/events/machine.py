@@ -160,8 +160,7 @@ class EventWriter:
         self._words_patience = words_patience
         self._texts: Latest[SpeechStart, str] = Latest(TEXTS_KEPT)
         """Words of speeches."""
-        self.interjected: Latest[SpeechStart, Interjection] = Latest(INTERJECTIONS_KEPT)
-        """What was last told of each speech into the robot's words."""
+        self._interjected: Latest[SpeechStart, Interjection] = Latest(INTERJECTIONS_KEPT)
         """What people have said into the robot's turns, as it was last told."""
         self._spoken: Latest[str, tuple[OngoingEvent, ConnectionEvent]] = Latest(TEXTS_KEPT)
         """Events with speech of a person, each as it was last told."""
@@ -224,24 +223,28 @@ class EventWriter:
     def interject(self, person: str, speech: Seconds, reading: InterjectionReading, at: Seconds) -> None:
         """Tell what somebody says into the robot's turn; that it begins, once. speech: its start."""
         words, stamp = self.text_of(person, speech), self.stamp
-        before = self.interjected.get(SpeechStart(person, speech))
+        before = self._interjected.get(SpeechStart(person, speech))
         if before is not None and (reading == "open" or (before.reading, before.words) == (reading, words)):
             return
         told = Interjection(
             actor=person, since=stamp(speech), at=stamp(max(at, self.now)), reading=reading, words=words
         )
-        self.interjected[SpeechStart(person, speech)] = told
+        self._interjected[SpeechStart(person, speech)] = told
         self.effects.append(told)
+
+    def remember(self, told: Interjection) -> None:
+        """Take this as told."""
+        self._interjected[SpeechStart(told.actor, told.since.seconds)] = told
 
     def decide_interjection(self, person: str, speech: Seconds, reading: InterjectionReading, at: Seconds) -> None:
         """Tell what it is that somebody says into the robot's turn, if that it began has been told, and no more."""
-        told = self.interjected.get(SpeechStart(person, speech))
+        told = self._interjected.get(SpeechStart(person, speech))
         if told is not None and told.reading in ("open", "noise"):
             self.interject(person, speech, reading, at)
 
     def interject_again(self, person: str, speech: Seconds, at: Seconds) -> None:
         """Tell once more what somebody has said into the robot's turn if its words are others by now."""
-        told, words = self.interjected.get(SpeechStart(person, speech)), self.text_of(person, speech)
+        told, words = self._interjected.get(SpeechStart(person, speech)), self.text_of(person, speech)
         if told is not None and words != told.words:
             self.interject(person, speech, told.reading, at)
 
@@ -290,7 +293,7 @@ class EventWriter:
         def named(speech: SpeechStart) -> SpeechStart:
             return SpeechStart(kept, speech.since) if speech.actor == other else speech
 
-        for remembered in (self._texts, self.interjected):
+        for remembered in (self._texts, self._interjected):
             for speech in [each for each in remembered if each.actor == other]:
                 told: Any = remembered.pop(speech)
                 if named(speech) not in remembered:

@@ -377,8 +377,7 @@ class SessionScene:
     def falls_silent(self, actor: str, at: Seconds) -> None:
         if actor in self._speakers:
             self._speakers.discard(actor)
-            others = [one for one in self._fell_silent if one[1] != actor]
-            self._fell_silent = sorted((*others, (at, actor)))[-2:]
+            self._fell_silent = sorted(((at, actor), *(one for one in self._fell_silent if one[1] != actor)))[-2:]
             self.silences += len(self._speakers) <= 1
             self.floor_changes += 1
 

@@ -18,7 +18,7 @@ from engage_hri.schemas.body import RobotState
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.fragments import HeadOwner
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost
-from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, Interjection, RequestEvent, SignalTurn, TurnOutcome
+from engage_hri.schemas.recognition import ConnectionEvent, EventOutcome, RequestEvent, SignalTurn, TurnOutcome
 from engage_hri.schemas.requests import ORPHANING, Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import World
@@ -27,7 +27,7 @@ from engage_hri.services.recognition.events.addressing import WHOEVER, WORDS_AFT
 from engage_hri.services.recognition.events.exchange import TURN_PATIENCE
 from engage_hri.services.recognition.events.history import ActionHistory, Latest
 from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING, Blocks, LimitClock, anchor
-from engage_hri.services.recognition.events.machine import Effect, EventWriter, Mishap, OngoingEvent, SpeechStart
+from engage_hri.services.recognition.events.machine import Effect, EventWriter, Mishap, OngoingEvent
 from engage_hri.services.recognition.events.people import People
 from engage_hri.services.recognition.events.person import Part, PersonRecognition
 from engage_hri.services.recognition.events.scene import Covered, SessionScene, Worded
@@ -80,6 +80,10 @@ class Session:
         """Persons with a task in hand."""
         self.contacts = self._people.contacts
         """Tells contact with each person for whom it has changed since the last call."""
+        self.has_open_event = self._writer.has_open
+        """Tells whether an event is open with a person."""
+        self.remember = self._writer.remember
+        """Takes an interjection that a former life has told, so that it is not told again."""
         self._ended_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
         self._aborted_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
         self._robot_actions: dict[tuple[str, Action], ActionBegan] = {}
@@ -213,10 +217,6 @@ class Session:
         )
         return self._take()
 
-    def remember(self, told: Interjection) -> None:
-        """Take that a former life has told this, so that it is not told again."""
-        self._writer.interjected[SpeechStart(told.actor, told.since.seconds)] = told
-
     def lose_track(self, person: str, at: Seconds) -> list[Effect]:
         """Begin anew with this person after a failure: its open events end as lost."""
         if person in self.persons:
@@ -236,10 +236,6 @@ class Session:
         self._people.join(other, kept, at, speaks=speaks)
         self._lose_untold(other, at)
         return self._take()
-
-    def has_open_event(self, person: str) -> bool:
-        """True if an event is open with this person."""
-        return self._writer.has_open(person)
 
     def _lose_untold(self, person: str, at: Seconds) -> None:
         """End the events that were asked for and not begun yet: a bug has shown before, or while they waited."""

@@ -58,11 +58,6 @@ class Talk(KindRecognizer):
         self.speeches = OwnSpeeches(id, scene, config, writer)
 
     @property
-    def is_in_line(self) -> bool:
-        """True if something of the talk is not told yet."""
-        return bool(self._line)
-
-    @property
     def question(self) -> Question | None:
         """The robot's question that waits for the person's answer, as far as is known; None: none does."""
         question = self._conversation.exchange.pair.question
@@ -233,7 +228,7 @@ class Talk(KindRecognizer):
             self._has_news(speech, at)
         known, over = speech.words, (at if speech.until is None else speech.until) + WORDS_AFTER
         is_in_time = at <= max(since + WORDS_WAIT, over if speech.is_beside else since) + ROUNDING
-        # What has been waited for was known when the speech began; for the words of who is alone the line does not wait.
+        # What has been waited for was known when the speech began. The line waits for no words of who is alone.
         if is_in_time and speech.company and any(each is speech for _, each in self._line):
             speech.part.words = known
         elif is_in_time and self._conversation.listener.listens_to(speech.part):
@@ -245,7 +240,7 @@ class Talk(KindRecognizer):
     def _judge(self, talk: Dialogue, speech: OwnSpeech, words: str, at: Seconds) -> None:
         """Take the words of a speech in their turn; if they decide nothing they are told all the same.
 
-        Of what nothing has been told they make speech, unless either has spoken since: what waits in line is told by now.
+        Of what nothing has been told they make speech, unless either has spoken since: all before has been told.
         """
         speech.part.words = words or speech.part.words
         talk.understand(speech.part, at)
@@ -269,13 +264,12 @@ class Talk(KindRecognizer):
             speech.is_noise = speech.is_heard = False  # more of the words may still call it
             speech.part.taken_for = ""
         elif not speech.is_heard and not any(each is speech for _, each in self._line):
-            is_over_sign = speech.until is not None and (speech.is_into_turn or speech.is_beside)
             speech.part.until = speech.until
             if speech.until is None:
                 speech.is_heard = True
                 self.take_early(speech.since, lambda talk: talk.speaks(speech.part, beside=speech.is_beside))
-            elif is_over_sign:
-                speech.is_noise, speech.is_heard = True, True
+            elif speech.is_into_turn or speech.is_beside:
+                speech.is_noise = speech.is_heard = True
                 speech.part.taken_for = "noise"  # as such it is judged by its words
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
