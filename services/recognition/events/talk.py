@@ -37,10 +37,11 @@ from engage_hri.services.text.listening import is_listening, says_words
 Step = Callable[[Dialogue], object]
 
 
-class CutOff(NamedTuple):
-    """The robot's turn was cut off: its pair ends, unless somebody has answered it before."""
+class Ending(NamedTuple):
+    """What ends a question of the robot, unless somebody has answered before. is_cut_off: the end of its turn does."""
 
     step: Step
+    is_cut_off: bool = False
 
 
 class Talk(KindRecognizer):
@@ -49,7 +50,7 @@ class Talk(KindRecognizer):
     def __init__(self, id: str, scene: SessionScene, config: RecognitionConfig, writer: EventWriter) -> None:
         super().__init__(id, scene, config, writer)
         self._conversation = Dialogue(id, scene, config, writer)
-        self._line: deque[tuple[Seconds, Step | OwnSpeech | CutOff]] = deque()
+        self._line: deque[tuple[Seconds, Step | OwnSpeech | Ending]] = deque()
         """What is not told yet, with its times. The first is a speech of which it is not known to whom it is."""
         self._asked_in_line: Seconds = inf
         """Start of the first turn of the robot that is in line; infinite: none is."""
@@ -245,22 +246,21 @@ class Talk(KindRecognizer):
         speech.part.words = words or speech.part.words
         talk.understand(speech.part, at)
         self._writer.interject_again(self.id, speech.since, at)
-        is_heard, is_speech = speech.is_heard, says_words(speech.words)
-        is_new = speech.is_noise and is_speech if is_heard else speech.is_to(self._scene.robot)
+        is_late = speech.is_noise and says_words(speech.words)
+        is_new = is_late if speech.is_heard else speech.is_to(self._scene.robot)
         if is_new and self._scene.is_last(self.id, speech.since, at):
-            if not is_heard:  # else it is beside a gesture that was told
+            if not speech.is_heard:  # else it is beside a gesture that was told
                 talk.exchange.take(speech.part)
             speech.is_noise, speech.is_heard = False, True
             self._scene.floor_changes += 1
 
     def _has_news(self, speech: OwnSpeech, at: Seconds) -> None:
         """Take news of a speech of which nothing is told yet: it may be for others than it seemed, and no noise."""
-        is_noise, robot = speech.is_noise, self._scene.robot
-        if is_noise and not says_words(speech.words):
+        if speech.is_noise and not says_words(speech.words):
             return
-        if not self.speeches.is_certain(speech, at) and is_noise and not speech.is_heard:
+        if not self.speeches.is_certain(speech, at) and speech.is_noise and not speech.is_heard:
             self.speeches.address(speech, self._likely(speech, at), at)
-        if not speech.is_to(robot):
+        if not speech.is_to(self._scene.robot):
             speech.is_noise = speech.is_heard = False  # more of the words may still call it
             speech.part.taken_for = ""
         elif not speech.is_heard and not any(each is speech for _, each in self._line):
@@ -386,7 +386,7 @@ class Talk(KindRecognizer):
 
     def abort(self, at: Seconds, *, turn: str) -> None:
         # Who has interrupted the turn has done so before that, also if it is known only now, and told of `at`.
-        cut_off, since = CutOff(lambda talk: talk.abort(at, turn=turn)), nextafter(at, inf)
+        cut_off, since = Ending(lambda talk: talk.abort(at, turn=turn), is_cut_off=True), nextafter(at, inf)
         if self._line or (self.asked_since < inf and self._scene.is_contested(self.id, since)):
             self._line.append((since, cut_off))
         else:
@@ -397,10 +397,10 @@ class Talk(KindRecognizer):
 
     def _take_in_order(self, at: Seconds, step: Step) -> None:
         """Take what ends a question of the robot, after what somebody else may have answered before."""
-        if self.asked_since < inf and self._waits_for_others(at):
-            self._line.append((at, step))
+        if self._line or (self.asked_since < inf and self._waits_for_others(at)):
+            self._line.append((at, Ending(step)))
         else:
-            self.take(at, step)
+            step(self._conversation)
 
     def _waits_for_others(self, at: Seconds) -> bool:
         """True if somebody else may have answered the robot before `at`. In its turn each who interrupts answers."""
@@ -412,10 +412,12 @@ class Talk(KindRecognizer):
         for each in self._writer.answered:
             if each.began <= at and not self.may_answer_before(each):
                 return True  # it is to be told first that this has answered for all
-        if since is None or isinstance(first, CutOff):
+        if since is None or (isinstance(first, Ending) and first.is_cut_off):
             return since is not None and self._scene.is_contested(self.id, since)
         # Else it says nothing, and ends no question.
-        may_matter = isinstance(first, OwnSpeech) or self._conversation.exchange.pair.may_be_answered
+        may_matter = isinstance(first, OwnSpeech) or (
+            isinstance(first, Ending) and self._conversation.exchange.pair.may_be_answered
+        )
         return may_matter and self._waits_for_others(since)
 
     @property
@@ -513,7 +515,7 @@ class Talk(KindRecognizer):
             if isinstance(item, OwnSpeech):
                 self._tell(item)
             else:
-                (item.step if isinstance(item, CutOff) else item)(self._conversation)
+                (item.step if isinstance(item, Ending) else item)(self._conversation)
         if not self._line:
             self._asked_in_line = inf
 
