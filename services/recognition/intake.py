@@ -72,14 +72,15 @@ from engage_hri.services.runtime.intake import (
     WithdrawStates,
 )
 
+Former = ConnectionEvent | Statistics | SamePeople | Interjection | OpenEvents
+"""Messages of a former life of recognition, which come by no bus."""
 Content = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | OngoingActions | World | RobotState | HeadOwner | WordSpoken
     | SyncPointProgress | BlockProgress | HeadPose | Looked | VoiceActivity | Utterance | RequestEvent | SignalTurn
-    | Cancel | PeerAlive | PeerGone | ConnectionEvent | Statistics | SamePeople | OpenEvents
+    | Cancel | PeerAlive | PeerGone | Former
 )  # fmt: skip
-"""Messages that recognition takes into account; the last four are those of its former life, and come by no bus."""
+"""Messages that recognition takes into account."""
 _CONTENT = get_args(Content)
-Former = ConnectionEvent | Statistics | SamePeople | OpenEvents
 _News = ActionBegan | ActionEnded | ActorFound | ActorLost | HeadPose | Looked | VoiceActivity | Utterance
 """Messages that tell of what has just happened."""
 
@@ -178,6 +179,9 @@ class Intake:
             return
         if isinstance(state, ConnectionEvent):
             self._statistics.remember(state)
+            return
+        if isinstance(state, Interjection):
+            self._recognizer.session.remember(self._identities.inward(state))
             return
         self._recognizer.former_until = max(self._recognizer.former_until, state.at.seconds)
         if isinstance(state, Statistics):

@@ -20,6 +20,7 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.recognition import (
     ConnectionEvent,
+    Interjection,
     OpenEvents,
     RequestEvent,
     SamePeople,
@@ -135,7 +136,7 @@ class _Recognition:
                     self.desk.refuse(request, fault)
 
 
-State = ConnectionEvent | Statistics | SamePeople | OpenEvents
+State = ConnectionEvent | Statistics | SamePeople | Interjection | OpenEvents
 ORDER = get_args(State)
 """Order in which they are recalled."""
 WINDOW: Seconds = RecognitionConfig().window
@@ -152,12 +153,14 @@ class FormerLife:
         self._window = window
         self._events: dict[str, ConnectionEvent] = {}
         """Events of the recent window, by id: each as started, or as decided."""
+        self._began: dict[str, Seconds] = {}
+        """When the events of the window began, and what people have said into the robot's words, by their keys."""
         self._kept: dict[str, bytes] = {}
         """States of this life, by key: as they are in the file, or will be once all has been recalled."""
         self._is_recalled = True
 
     def recall(self) -> Iterator[State]:
-        """Read what a former life has kept: recent events, counts, who is the same, and then open pairs.
+        """Read what a former life has kept: recent events, counts, who is the same, words, and then open pairs.
 
         The file stays as it is until the last of it has been taken: until then nothing else has all of it, should
         this life end now. Raises OSError or `msgspec.DecodeError` at once.
@@ -172,6 +175,8 @@ class FormerLife:
         for state in states:
             if isinstance(state, ConnectionEvent):
                 self._keep_event(state)
+            elif isinstance(state, Interjection):
+                self._keep_interjection(state)
             yield state
         self._is_recalled = True
 
@@ -181,6 +186,9 @@ class FormerLife:
             return
         if isinstance(message, ConnectionEvent):
             self._keep_event(message)  # the state that has changed with it is told next, and written
+        elif isinstance(message, Interjection):
+            self._keep_interjection(message)
+            self._write(self._path)
         elif isinstance(message, State):
             self._kept[key] = msgspec.json.encode(message)
             self._write(self._path)
@@ -195,18 +203,27 @@ class FormerLife:
         elif event.retold:
             self._drop([id for id, each in self._events.items() if is_same_start(each, event)])
         self._events[event.id] = event
-        self._kept[event.id] = msgspec.json.encode(event)
+        self._keep_recent(event.id, event, event.started.seconds)
+
+    def _keep_interjection(self, told: Interjection) -> None:
+        """Keep what was last told of a speech into the robot's words."""
+        since = told.since.seconds
+        self._keep_recent(f"{keys.interjection(told.actor)}/{since}", told, since)
+
+    def _keep_recent(self, id: str, event: ConnectionEvent | Interjection, began: Seconds) -> None:
+        """Keep what began then, and no longer what began before the window."""
+        self._began[id], self._kept[id] = began, msgspec.json.encode(event)
         until = event.at.seconds - self._window
-        left = takewhile(lambda each: each.started.seconds <= until, self._events.values())
-        self._drop([each.id for each in left])
+        self._drop([*takewhile(lambda id: self._began[id] <= until, self._began)])
 
     def _drop(self, ids: list[str]) -> None:
         for id in ids:
-            del self._events[id], self._kept[id]
+            del self._began[id], self._kept[id]
+            self._events.pop(id, None)
 
-    def forget(self, keys: tuple[str, ...]) -> None:
+    def forget(self, states: tuple[str, ...]) -> None:
         """Keep no state of these keys any longer."""
-        if self._path is not None and [self._kept.pop(key) for key in keys if key in self._kept]:
+        if self._path is not None and [self._kept.pop(key) for key in states if key in self._kept]:
             self._write(self._path)
 
     def _write(self, path: Path) -> None:

@@ -8,9 +8,9 @@ from math import inf
 
 from msgspec.structs import replace
 
-from tests.recognition.coder import BRIEF, FACE_GRACE, ROUND, WORDS_WAIT, is_noise, longest_sound
+from tests.recognition.coder import BRIEF, FACE_GRACE, LAST, ROUND, WORDS_AFTER, WORDS_WAIT, is_noise, longest_sound
 from tests.recognition.observations import ROBOT
-from tests.recognition.timeline import CALLED, LIMIT, Span, Timeline
+from tests.recognition.timeline import CALLED, LIMIT, Instant, Span, Timeline
 
 GREETINGS = ("hey", "hello")
 """Words before a name that calls somebody, of those that are drawn."""
@@ -118,8 +118,14 @@ def _looked_at(speech: Span, before: Timeline) -> str:
     return next((face for face, common in seconds.items() if common > HALF * speech.seconds + ROUND), "")
 
 
+def _decided(speech: Span, before: Timeline) -> Instant:
+    """When it is decided to whom a speech is, and known that it is no cough: with its words, if there are any."""
+    none_come = (speech.until[0] + WORDS_AFTER, LAST) if before.is_worded else speech.until
+    return min(max(speech.until, speech.known or none_come), (speech.since[0] + longest_sound(before), 0))
+
+
 def _is_awaited(speech: Span, before: Timeline) -> bool:
-    """True if the robot has asked the speaker, and nobody has answered yet."""
+    """True if the robot has asked the speaker, and nobody has answered yet, as far as is known then."""
     at = speech.since
     asked = [turn for turn in before.turns if turn.kind == "asks" and speech.who in turn.to and turn.until < at]
     if not asked or asked[-1].is_aborted or at[0] > asked[-1].until[0] + LIMIT + ROUND:
@@ -129,8 +135,15 @@ def _is_awaited(speech: Span, before: Timeline) -> bool:
         if each.to == ROBOT and asked[-1].since < each.since and each.since[0] < at[0] and each.action != "look"
     ]  # fmt: skip
     return not any(
-        not is_noise(each, before) if each.action == "speak" else not _is_beside_words(each, before) for each in since
-    )
+        not is_noise(each, before) and _is_known_by(each, speech, before)
+        if each.action == "speak" else not _is_beside_words(each, before)
+        for each in since
+    )  # fmt: skip
+
+
+def _is_known_by(each: Span, speech: Span, before: Timeline) -> bool:
+    """True if it is known to whom somebody has spoken, and that it was no cough, when another's speech is decided."""
+    return each.who == speech.who or _decided(each, before) <= _decided(speech, before)
 
 
 def _is_beside_words(sign: Span, before: Timeline) -> bool:
@@ -143,16 +156,14 @@ def _is_beside_words(sign: Span, before: Timeline) -> bool:
 
 def _answered(speech: Span, before: Timeline) -> str:
     """Who has spoken to the speaker last, or to whom the speaker has; "": neither, as long as an answer may take."""
-    at, decided = speech.since[0], max(speech.until, speech.known or speech.until)
+    at = speech.since[0]
     heard: list[tuple[float, float, str, str]] = []
     for turn in before.turns:
         if speech.who in turn.to:
             heard += [(until[0], since[0], ROBOT, "") for since, until in turn.speech]
     for each in before.spans:
-        if each.action == "speak" and not is_noise(each, before) and speech.who in (each.who, each.to):
-            known = min(max(each.until, each.known or each.until), (each.since[0] + longest_sound(before), 0))
-            if each.who != speech.who and known > decided:
-                continue  # nobody knows yet to whom it is, or that it is no cough
+        is_speech = each.action == "speak" and not is_noise(each, before) and speech.who in (each.who, each.to)
+        if is_speech and _is_known_by(each, speech, before):
             heard.append((each.until[0], each.since[0], each.who, each.to))
     recent = [
         (min(until, at), since, who, to) for until, since, who, to in heard if since < at <= until + LIMIT + ROUND

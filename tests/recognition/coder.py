@@ -228,13 +228,17 @@ class Coder:
             late = [each for each in sign if self._is_told_late(each, following, over)]
             is_brief = any(over < each.known for each in late if each.known is not None) and not goes_on
             parts = [each for each in sign if each not in late and self._shows(each)]
-            interrupts = [each for each in sign if each.action == "speak" and self._interrupts(each, turn)]
-            self._late += [
-                each for each in late
-                if not parts and each not in interrupts and not self._is_known_in(each, turn)
-                and each.words not in LISTENING and self._is_last(each)
+            corrected = [each for each in late if each.known is not None and each.known < turn.until]
+            interrupts = [
+                each for each in sign
+                if each.action == "speak" and self._interrupts(each, turn) and (each not in late or each in corrected)
             ]  # fmt: skip
             answers = sorted([*goes_on, *interrupts], key=lambda each: each.since)
+            self._late += [
+                each for each in late
+                if not parts and not answers and each not in corrected
+                and each.words not in LISTENING and self._is_last(each)
+            ]  # fmt: skip
             if any(each.action == "speak" for each in answers) or (answers and not found):
                 found.append(answers[0])
                 is_listening = is_brief
@@ -244,7 +248,7 @@ class Coder:
                 self._note("backchannel", ROBOT, side.person, parts[0].since[0], "completed")
                 continue  # one sign gives one, also if words of it come later
             for each in late if not answers else ():
-                if each.words in LISTENING and (self._is_known_in(each, turn) or self._is_last(each)):
+                if each.words in LISTENING and (each in corrected or self._is_last(each)):
                     self._note("backchannel", ROBOT, side.person, each.since[0], "completed")
         return found
 
@@ -451,16 +455,16 @@ def is_noise(one: Span, timeline: Timeline) -> bool:
     """True for a sound of which no words come where they would have come, or too late to say anything."""
     if not timeline.is_worded:
         return False
-    longest, wait = longest_sound(timeline), one.until[0] + WORDS_AFTER
+    longest, wait = longest_sound(timeline), (one.until[0] + WORDS_AFTER + ROUND, LAST)
     for turn in timeline.turns:
         for since, until in [(turn.since, turn.until)] if one.who in turn.to else turn.speech:
             if one.to == ROBOT and since < one.since < until:
                 if until < one.until:
                     return False
                 if one.who in turn.to:
-                    longest, wait = WORDS_WAIT, one.since[0] + WORDS_WAIT
-                wait = max(wait, until[0])
-    if one.known is None or (one.known[0] > wait and has_spoken_since(one, timeline)):
+                    longest, wait = WORDS_WAIT, (one.since[0] + WORDS_WAIT + ROUND, LAST)
+                wait = max(wait, until)
+    if one.known is None or (one.known > wait and has_spoken_since(one, timeline)):
         return one.seconds <= longest + ROUND
     return False
 

@@ -174,9 +174,20 @@ class JoinDrawing(CompanyDrawing):
                 if each.who == who
             ):
                 return
+        elif join.is_known:
+            self._begin_alone(who)
         else:
             self._order_by_id(who, len(NAMES) + number)
         self.timeline.joins.append(join)
+
+    def _begin_alone(self, who: str) -> None:
+        """Let nobody begin to speak with who is known by both ids: it depends on what is open which one counts."""
+        begins = {each.since[0] for each in self.timeline.spans if each.action == "speak" and each.who != who}
+        for each in self.timeline.spans:
+            if each.who == who and each.action == "speak" and each.since[0] in begins:
+                is_line, each.since = each.is_line, (each.since[0] + 0.002, each.since[1])
+                if is_line:
+                    each.until, each.known = each.since, (each.since[0], each.since[1] + 1)
 
     def _order_by_id(self, who: str, number: int) -> None:
         """Observe somebody in the order of the id by which recognition knows them: it decides between two at once."""

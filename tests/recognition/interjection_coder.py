@@ -10,7 +10,7 @@ from itertools import pairwise
 from msgspec import Struct
 
 from engage_hri.schemas.recognition import Interjection
-from tests.recognition.coder import BRIEF, ROUND, WORDS_AFTER, WORDS_WAIT, has_spoken_since, longest_sound
+from tests.recognition.coder import BRIEF, LAST, ROUND, WORDS_AFTER, WORDS_WAIT, has_spoken_since, longest_sound
 from tests.recognition.observations import ROBOT
 from tests.recognition.timeline import LISTENING, Instant, Span, Timeline, Turn
 
@@ -20,6 +20,7 @@ LATER = {
     ("noise", "interruption"),
     ("backchannel", "interruption"),
     ("noise", "answer"),
+    ("noise", "other"),
     ("interruption", "backchannel"),
 }
 """What words that come late make of what was decided."""
@@ -121,7 +122,8 @@ def _reading(one: Into, timeline: Timeline) -> set[str]:
     is_long = speech.seconds > WORDS_WAIT + ROUND and wait < over  # it has been one that interrupts before
     is_of_answer = not is_long and turn.kind == "asks" and any(turn.until < each.until for each in beside)
     if is_of_answer and not one.is_beside and not outlasts:
-        return {"answer", by_words if known is not None and known[0] <= wait else "noise"}
+        decided = turn.until if turn.is_aborted else (wait, LAST)  # a cut decides at once
+        return {"answer", by_words if known is not None and known <= decided else "noise"}
     if known is not None and (not outlasts or known < one.until):
         heard = max(wait, until + WORDS_AFTER) if one.is_beside else wait
         is_in_time = known[0] <= heard

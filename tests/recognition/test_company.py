@@ -284,12 +284,11 @@ who stands by and says "uh-huh" to the robot listens
     robot: started 1, failed 9
     bob: started 4.8, failed 9.2
 
-words that come late after a second speech are those of the first
+words that come late say nothing if a second speech has begun, also if it is not decided yet
     0 ann said 0; 1 robot asks ann 2; 3.5 ann speaks 0.3; 5.4 ann speaks 1; 6 ann said 3.5; 6.5 ann said 5.4; 30 end
-    robot: started 1, succeeded 3.5 after 0.5, completed 3.8
-    ann: started 5.4, failed 10.4
+    robot: started 1, succeeded 5.4 after 2.4, completed 6.4
 
-... but say nothing if that has been heard before
+... or if that has been heard before
     0 ann said 0; 2 ann looks robot; 3.5 ann speaks 0.3; 5.5 ann speaks 1; 6.6 ann said 5.5; 7 ann said 3.5; 30 end
     ann: started 5.5, failed 10.5
 

@@ -13,6 +13,7 @@ from engage_hri.schemas.perception import ActionBegan, ActionEnded, Utterance
 from engage_hri.schemas.recognition import (
     ConnectionEvent,
     EventState,
+    Interjection,
     KindStatistics,
     RequestEvent,
     SignalTurn,
@@ -143,6 +144,46 @@ async def test_words_that_the_bus_remembers_are_no_second_question(hub: MemoryHu
         after = await last(bus, HUMAN)
 
     assert pairs(after) == (1, 1, 0)
+
+
+@pytest.mark.parametrize("words_after", [0.2, 1.0])
+async def test_what_is_said_into_the_robots_words_is_told_once(
+    hub: MemoryHub, tmp_path: Path, words_after: float
+) -> None:
+    """Recognition is killed 0.6 s after the person has begun. The words come before that, or in the next life.
+
+    The bus remembers all of it.
+    """
+    memory, bus, body = str(tmp_path / "recognition.json"), hub.join("perception"), hub.join("control")
+
+    async def says(words: str) -> None:
+        began = bus.stamp()
+        bus.publish(keys.PERCEIVED_ACTION, ActionBegan(actor=HUMAN, action="speak", at=began))
+        await asyncio.sleep(words_after)
+        ended = bus.stamp()
+        bus.publish(keys.PERCEIVED_ACTION, ActionEnded(actor=HUMAN, action="speak", at=ended))
+        heard = Utterance(actor=HUMAN, id=str(began.seconds), text=words, began=began, ended=ended, at=ended)
+        bus.publish(keys.UTTERANCE, heard)
+
+    with bus.subscribe(keys.ANY_INTERJECTION) as told:
+        async with running(hub, recognition(memory=memory)):
+            bus.publish(keys.WORLD, world())
+            await says("good morning")
+            await asyncio.sleep(0.5)
+            robots = ActionBegan(actor=ROBOT, action="speak", at=body.stamp(), behavior="b:s")
+            body.publish(keys.ROBOT_ACTION, robots)
+            await asyncio.sleep(0.2)
+            saying = asyncio.create_task(says("uh-huh"))
+            await asyncio.sleep(0.6)
+            hub.kill("recognition")
+        async with running(hub, recognition(memory=memory)):
+            await saying
+            await asyncio.sleep(3.0)
+        received = [await told.next() for _ in range(len(told))]
+
+    messages = [each.message for each in received if each is not None]
+    readings = [(each.reading, each.words) for each in messages if isinstance(each, Interjection)]
+    assert readings == [("open", ""), ("backchannel", "uh-huh")]
 
 
 async def test_without_a_file_all_begins_anew(hub: MemoryHub) -> None:

@@ -269,10 +269,6 @@ class AdjacencyPair(Machine):
         """True if the robot waits for an answer of the person, and `action` is one."""
         return self.event is not None and self.state == ROBOT_WAITING and action in self.event.accept
 
-    def may_go_on_with(self, action: Action) -> bool:
-        """True if `action` of the person would be the answer, or more of a turn that waits for one."""
-        return self.may_be_answered_with(action) or self.state == HUMAN_WAITING
-
     def human_begins(self, action: Action, at: Seconds, confidence: Probability = 1.0) -> bool:
         """Take a person's action as the answer to the robot's turn, in time. False if it is none."""
         self._pass_limit(at)

@@ -53,12 +53,6 @@ class Backchannel(Machine):
         since = self.undecided_since
         return inf if since is None else since + self._limit
 
-    def speaks(self, event: OngoingEvent) -> None:
-        self._begin(event, "speaks")
-
-    def gestures(self, event: OngoingEvent) -> None:
-        self._begin(event, "gestures")
-
     def announced(self, event: OngoingEvent) -> None:
         """Begin a backchannel that the robot announces. Its speech may have been noticed already."""
         if self.state == BRIEF:
@@ -69,7 +63,8 @@ class Backchannel(Machine):
         self.step("announced", event.started)
         self.last = (event.started, event.id)
 
-    def _begin(self, event: OngoingEvent, given: str) -> None:
+    def begin(self, event: OngoingEvent, given: str) -> None:
+        """Begin speech, or a gesture (given: `speaks`, `gestures`); while speech is undecided it is part of that."""
         if self.state == BRIEF:
             self.ends(event.started)
         if self.state == UNDECIDED:

@@ -62,7 +62,7 @@ class Dialogue:
         if at == inf or pair.is_interrupted:
             return at
         began_in_time = sign is not None and any(in_time(speech.since, at) for speech in sign.speeches)
-        if began_in_time and pair.may_go_on_with("speak"):
+        if began_in_time and (pair.may_be_answered_with("speak") or not pair.may_be_answered):
             return inf
         return inf if self._scene.may_be_answered(self.id, at) and pair.question is not None else at
 
@@ -164,7 +164,7 @@ class Dialogue:
         self.exchange.pair.robot_heard(None)
         if self._speech is not None and not self.exchange.pair.robot_holds_turn:
             if self.robot_backchannel.state != BRIEF and not self.exchange.pair.is_cut_into:
-                self.robot_backchannel.speaks(self._robots_backchannel(at))
+                self.robot_backchannel.begin(self._robots_backchannel(at), "speaks")
         else:
             self.exchange.pair.robot_begins("speak", at)
             self.exchange.pair.forget_unanswered()
@@ -186,7 +186,7 @@ class Dialogue:
             if not listens:
                 self.exchange.pair.robot_begins(action, at)
         elif self.robot_backchannel.state == IDLE:
-            self.robot_backchannel.gestures(self._robots_backchannel(at))
+            self.robot_backchannel.begin(self._robots_backchannel(at), "gestures")
 
     def robot_goes_on(self, action: Action, since: Seconds) -> None:
         """Take speech or a gesture of the robot that goes on, known only now. It may be the answer."""

@@ -58,8 +58,8 @@ class Listener:
 
     def next_begins(self) -> None:
         """Decide the sign if it is over: its words have not come until the next one begins, or the robot's turn."""
-        if self.sign is not None and self.sign.until is not None:
-            self._has_no_words(self.sign, self.sign.until)
+        if self.sign is not None:
+            self._has_no_words(self.sign, self._writer.now)
 
     def _joins(self, part: SignPart, *, beside: bool = False) -> None:
         if self.sign is None:
@@ -67,7 +67,7 @@ class Listener:
         self.sign.parts.append(part)
         self.sign.is_wordless = False  # this one's words may come
         if part.action == "speak":
-            self._scene.read(self._id, part.since, "open")
+            self._scene.read(self._id, part.since, "open", part.since)
 
     def listens_to(self, part: SignPart) -> bool:
         """True if this is part of the sign."""
@@ -192,8 +192,8 @@ class Listener:
         listens, taken = self._is_listening(speech), speech.taken_for
         is_new = taken == "noise" and (in_turn or is_last)
         if listens is False and (is_new or (in_turn and taken == "backchannel")):
-            is_over = (self._scene.robot_speaks_since or inf) > speech.since  # the words into which it was said
-            self._is_turn(speech, "answer" if is_over and not in_turn else "interruption", at)
+            is_into_words = in_turn or self._scene.robot_says(speech.since, at)
+            self._is_turn(speech, "interruption" if is_into_words else "answer", at)
         elif listens and (is_new or self._exchange.pair.was_listening(speech.since)):
             if speech.until is None:
                 self._joins(speech)
@@ -216,12 +216,13 @@ class Listener:
         if not parts:
             return
         told = ListenerSign(parts)
-        self._backchannel.speaks(
+        self._backchannel.begin(
             OngoingEvent(
                 kind="backchannel", initiator=self._scene.robot, responder=self._id, started=told.since,
                 confidence=told.confidence,
                 spoken=tuple(SpeechStart(self._id, speech.since) for speech in told.speeches),
-            )
+            ),
+            "speaks",
         )  # fmt: skip
         self._backchannel.ends(until if told.until is None else told.until)
         for speech in sign.speeches:
@@ -255,7 +256,7 @@ class Listener:
 
     def _read(self, since: Seconds, reading: InterjectionReading, at: Seconds) -> None:
         """Tell what a speech is, and remember it for what others say after it."""
-        self._scene.read(self._id, since, reading)
+        self._scene.read(self._id, since, reading, at)
         self._writer.interject(self._id, since, reading, at)
 
     # -- its words ----------------------------------------------------------------------------------------------

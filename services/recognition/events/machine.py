@@ -232,6 +232,10 @@ class EventWriter:
         self._interjected[SpeechStart(person, speech)] = told
         self.effects.append(told)
 
+    def remember(self, told: Interjection) -> None:
+        """Take this as told."""
+        self._interjected[SpeechStart(told.actor, told.since.seconds)] = told
+
     def decide_interjection(self, person: str, speech: Seconds, reading: InterjectionReading, at: Seconds) -> None:
         """Tell what it is that somebody says into the robot's turn, if that it began has been told, and no more."""
         told = self._interjected.get(SpeechStart(person, speech))

@@ -75,14 +75,8 @@ class OwnSpeeches:
         """Take the words of a speech. told: addressees, if perception knows them."""
         if says_words(words):
             speech.worded_at = at if speech.worded_at == -inf else speech.worded_at
-            self.is_no_noise(speech)
+            self._scene.is_no_noise(speech, at)
         speech.words, speech.told = words or speech.words, told or speech.told
-
-    def is_no_noise(self, speech: OwnSpeech) -> None:
-        """Note that a sound is no noise, or that nothing else may be known of it."""
-        if speech.may_be_noise:
-            speech.may_be_noise = False
-            self._scene.floor_changes += 1
 
     def is_certain(self, speech: OwnSpeech, at: Seconds) -> bool:
         """Decide to whom the speech is if that is certain."""

@@ -192,8 +192,7 @@ class PersonRecognition:
 
     def gaze_changed(self, at: Seconds) -> None:
         """Take a change of the person's gaze."""
-        if self.talk.is_in_line:
-            self.talk.looks_at(self.gazes.face, at)
+        self.talk.looks_at(self.gazes.face, at)
         self.gazes.gaze_changed(at)
 
     # -- the robot ----------------------------------------------------------------------------------------------

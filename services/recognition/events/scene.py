@@ -270,29 +270,44 @@ class SessionScene:
             spoken.noted_at = at
             self.spoken.append(spoken)
 
+    def is_no_noise(self, spoken: Spoken, at: Seconds) -> None:
+        """Note that a sound is no noise, or that nothing else may be known of it: it counts for others since then."""
+        if spoken.may_be_noise:
+            spoken.may_be_noise, spoken.noted_at = False, max(at, spoken.noted_at)
+            self.floor_changes += 1
+
     def spoken_since(self, actor: str, since: Seconds) -> Spoken | None:
         """The speech that began then; None: it is not known to whom it was, or long ago."""
         return next((each for each in self.spoken if each.actor == actor and each.since == since), None)
 
     def is_last(self, person: str, since: Seconds, until: Seconds = inf) -> bool:
-        """True if neither the person nor the robot has begun to say something to the other since, until then."""
-        said = [each for each in self.spoken if since < each.since <= until and each.is_speech]
+        """True if neither the person nor the robot has begun to say something to the other since, until then.
+
+        What may be noise counts as said, as long as it is not decided.
+        """
+        said = [each for each in self.spoken if since < each.since <= until and not each.is_noise]
         robot = self.robot
         return not any(
             each.is_to(robot) if each.actor == person else each.actor == robot and each.is_to(person) for each in said
         )
+
+    def robot_says(self, since: Seconds, at: Seconds) -> bool:
+        """True if what the robot says at `at` goes on since then."""
+        said = [each for each in self.spoken if each.actor == self.robot and each.since <= since]
+        return any(each.until is None or at < each.until for each in said)
 
     def forget_spoken(self, spoken: Spoken) -> None:
         """Forget a speech that was another one's: two have told of it."""
         self.floor_changes += 1
         self.spoken = deque((each for each in self.spoken if each is not spoken), SPOKEN_KEPT)
 
-    def read(self, actor: str, since: Seconds, reading: InterjectionReading) -> None:
-        """Take what a speech into the robot's words is."""
+    def read(self, actor: str, since: Seconds, reading: InterjectionReading, at: Seconds) -> None:
+        """Take what a speech into the robot's words is, as is known at `at`."""
         if (spoken := self.spoken_since(actor, since)) is not None:
             spoken.is_open, spoken.is_noise = reading == "open", reading == "noise"
-            spoken.may_be_noise &= spoken.is_open
             self.floor_changes += 1
+            if not spoken.is_open:
+                self.is_no_noise(spoken, at)
 
     def ended(self) -> list[Spoken]:
         """The speeches that were over last, in the order of their ends: of those known to be some, and to whom."""
@@ -362,8 +377,7 @@ class SessionScene:
     def falls_silent(self, actor: str, at: Seconds) -> None:
         if actor in self._speakers:
             self._speakers.discard(actor)
-            others = [one for one in self._fell_silent if one[1] != actor]
-            self._fell_silent = sorted((*others, (at, actor)))[-2:]
+            self._fell_silent = sorted(((at, actor), *(one for one in self._fell_silent if one[1] != actor)))[-2:]
             self.silences += len(self._speakers) <= 1
             self.floor_changes += 1
 

@@ -80,6 +80,10 @@ class Session:
         """Persons with a task in hand."""
         self.contacts = self._people.contacts
         """Tells contact with each person for whom it has changed since the last call."""
+        self.has_open_event = self._writer.has_open
+        """Tells whether an event is open with a person."""
+        self.remember = self._writer.remember
+        """Takes an interjection that a former life has told, so that it is not told again."""
         self._ended_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
         self._aborted_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
         self._robot_actions: dict[tuple[str, Action], ActionBegan] = {}
@@ -232,10 +236,6 @@ class Session:
         self._people.join(other, kept, at, speaks=speaks)
         self._lose_untold(other, at)
         return self._take()
-
-    def has_open_event(self, person: str) -> bool:
-        """True if an event is open with this person."""
-        return self._writer.has_open(person)
 
     def _lose_untold(self, person: str, at: Seconds) -> None:
         """End the events that were asked for and not begun yet: a bug has shown before, or while they waited."""

@@ -37,10 +37,11 @@ from engage_hri.services.text.listening import is_listening, says_words
 Step = Callable[[Dialogue], object]
 
 
-class CutOff(NamedTuple):
-    """The robot's turn was cut off: its pair ends, unless somebody has answered it before."""
+class Ending(NamedTuple):
+    """What ends a question of the robot, unless somebody has answered before. is_cut_off: the end of its turn does."""
 
     step: Step
+    is_cut_off: bool = False
 
 
 class Talk(KindRecognizer):
@@ -49,18 +50,13 @@ class Talk(KindRecognizer):
     def __init__(self, id: str, scene: SessionScene, config: RecognitionConfig, writer: EventWriter) -> None:
         super().__init__(id, scene, config, writer)
         self._conversation = Dialogue(id, scene, config, writer)
-        self._line: deque[tuple[Seconds, Step | OwnSpeech | CutOff]] = deque()
+        self._line: deque[tuple[Seconds, Step | OwnSpeech | Ending]] = deque()
         """What is not told yet, with its times. The first is a speech of which it is not known to whom it is."""
         self._asked_in_line: Seconds = inf
         """Start of the first turn of the robot that is in line; infinite: none is."""
         self._asked_in_turn = ""
         """The last turn in which the robot has asked the person."""
         self.speeches = OwnSpeeches(id, scene, config, writer)
-
-    @property
-    def is_in_line(self) -> bool:
-        """True if something of the talk is not told yet."""
-        return bool(self._line)
 
     @property
     def question(self) -> Question | None:
@@ -231,53 +227,50 @@ class Talk(KindRecognizer):
         self.speeches.hear(speech, words, told, at)
         if not speech.is_heard or speech.is_noise:
             self._has_news(speech, at)
-        known, is_in_time = speech.words, self._is_in_time(speech, at)
-        self.take_early(since if is_in_time else at, lambda talk: self._judge(talk, speech, known, at))
+        known, over = speech.words, (at if speech.until is None else speech.until) + WORDS_AFTER
+        is_in_time = at <= max(since + WORDS_WAIT, over if speech.is_beside else since) + ROUNDING
+        # What has been waited for was known when the speech began. The line waits for no words of who is alone.
+        if is_in_time and speech.company and any(each is speech for _, each in self._line):
+            speech.part.words = known
+        elif is_in_time and self._conversation.listener.listens_to(speech.part):
+            self.take_early(since, lambda talk: self._judge(talk, speech, known, at))
+        else:
+            self._take_in_order(at, lambda talk: self._judge(talk, speech, known, at))
         self.go_on(at)
 
-    def _is_in_time(self, speech: OwnSpeech, at: Seconds) -> bool:
-        """True if words into the robot's words, known at `at`, count as known when the speech began.
-
-        They have been waited for, in line or by the conversation; it does not wait in line for those of who is alone.
-        """
-        is_waited_for = bool(speech.company) or self._conversation.listener.listens_to(speech.part)
-        over = (at if speech.until is None else speech.until) + WORDS_AFTER if speech.is_beside else speech.since
-        return is_waited_for and at <= max(speech.since + WORDS_WAIT, over) + ROUNDING
-
     def _judge(self, talk: Dialogue, speech: OwnSpeech, words: str, at: Seconds) -> None:
-        """Take the words of a speech in their turn; if they decide nothing they are told all the same."""
+        """Take the words of a speech in their turn; if they decide nothing they are told all the same.
+
+        Of what nothing has been told they make speech, unless either has spoken since: all before has been told.
+        """
         speech.part.words = words or speech.part.words
         talk.understand(speech.part, at)
         self._writer.interject_again(self.id, speech.since, at)
-        if (
-            speech.is_noise
-            and speech.is_heard
-            and says_words(speech.words)
-            and self._scene.is_last(self.id, speech.since)
-        ):
-            speech.is_noise = False  # its words come late, beside a gesture that was told
+        is_late = speech.is_noise and says_words(speech.words)
+        is_new = is_late if speech.is_heard else speech.is_to(self._scene.robot)
+        if is_new and self._scene.is_last(self.id, speech.since, at):
+            if not speech.is_heard:  # else it is beside a gesture that was told
+                talk.exchange.take(speech.part)
+            speech.is_noise, speech.is_heard = False, True
             self._scene.floor_changes += 1
 
     def _has_news(self, speech: OwnSpeech, at: Seconds) -> None:
         """Take news of a speech of which nothing is told yet: it may be for others than it seemed, and no noise."""
-        is_noise, robot = speech.is_noise, self._scene.robot
-        if is_noise and not says_words(speech.words):
+        if speech.is_noise and not says_words(speech.words):
             return
-        if not self.speeches.is_certain(speech, at) and is_noise and not speech.is_heard:
+        if not self.speeches.is_certain(speech, at) and speech.is_noise and not speech.is_heard:
             self.speeches.address(speech, self._likely(speech, at), at)
-        if not speech.is_to(robot):
+        if not speech.is_to(self._scene.robot):
             speech.is_noise = speech.is_heard = False  # more of the words may still call it
             speech.part.taken_for = ""
         elif not speech.is_heard and not any(each is speech for _, each in self._line):
-            is_over_sign = speech.until is not None and (speech.is_into_turn or speech.is_beside)
-            speech.is_noise, speech.is_heard = is_over_sign, True
             speech.part.until = speech.until
             if speech.until is None:
+                speech.is_heard = True
                 self.take_early(speech.since, lambda talk: talk.speaks(speech.part, beside=speech.is_beside))
-            elif is_over_sign:
+            elif speech.is_into_turn or speech.is_beside:
+                speech.is_noise = speech.is_heard = True
                 speech.part.taken_for = "noise"  # as such it is judged by its words
-            elif self._scene.is_last(self.id, speech.since):  # what either has said since may wait in line
-                self.take_early(speech.since, lambda talk: talk.exchange.take(speech.part))
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         """Take the person's leaving: nothing waits any longer."""
@@ -393,7 +386,7 @@ class Talk(KindRecognizer):
 
     def abort(self, at: Seconds, *, turn: str) -> None:
         # Who has interrupted the turn has done so before that, also if it is known only now, and told of `at`.
-        cut_off, since = CutOff(lambda talk: talk.abort(at, turn=turn)), nextafter(at, inf)
+        cut_off, since = Ending(lambda talk: talk.abort(at, turn=turn), is_cut_off=True), nextafter(at, inf)
         if self._line or (self.asked_since < inf and self._scene.is_contested(self.id, since)):
             self._line.append((since, cut_off))
         else:
@@ -404,10 +397,10 @@ class Talk(KindRecognizer):
 
     def _take_in_order(self, at: Seconds, step: Step) -> None:
         """Take what ends a question of the robot, after what somebody else may have answered before."""
-        if self.asked_since < inf and self._waits_for_others(at):
-            self._line.append((at, step))
+        if self._line or (self.asked_since < inf and self._waits_for_others(at)):
+            self._line.append((at, Ending(step)))
         else:
-            self.take(at, step)
+            step(self._conversation)
 
     def _waits_for_others(self, at: Seconds) -> bool:
         """True if somebody else may have answered the robot before `at`. In its turn each who interrupts answers."""
@@ -419,10 +412,12 @@ class Talk(KindRecognizer):
         for each in self._writer.answered:
             if each.began <= at and not self.may_answer_before(each):
                 return True  # it is to be told first that this has answered for all
-        if since is None or isinstance(first, CutOff):
+        if since is None or (isinstance(first, Ending) and first.is_cut_off):
             return since is not None and self._scene.is_contested(self.id, since)
         # Else it says nothing, and ends no question.
-        may_matter = isinstance(first, OwnSpeech) or self._conversation.exchange.pair.may_be_answered
+        may_matter = isinstance(first, OwnSpeech) or (
+            isinstance(first, Ending) and self._conversation.exchange.pair.may_be_answered
+        )
         return may_matter and self._waits_for_others(since)
 
     @property
@@ -469,7 +464,7 @@ class Talk(KindRecognizer):
             is_sign = self._conversation.listener.listens_to(speech.part)
             speech.is_open &= is_sign
             if not is_sign:
-                self.speeches.is_no_noise(speech)
+                self._scene.is_no_noise(speech, self._writer.now)
 
     def _decide(self, speech: OwnSpeech, at: Seconds) -> None:
         """Decide what the sound is, by what was known when it was due: nothing, or to whom it is."""
@@ -479,7 +474,7 @@ class Talk(KindRecognizer):
         is_noise = is_judged_here and speech.may_be_noise and speech.until is not None
         speech.is_decided = True
         if is_judged_here:
-            self.speeches.is_no_noise(speech)
+            self._scene.is_no_noise(speech, at)
         if is_noise:
             speech.is_noise, speech.is_open, speech.to = True, False, NOBODY
             self._writer.decide_interjection(self.id, speech.since, "noise", at)
@@ -493,11 +488,14 @@ class Talk(KindRecognizer):
         return self.speeches.likely(speech, at, frozenset((self._scene.robot,)) if waits else NOBODY)
 
     def may_go_on(self, now: Seconds) -> bool:
-        """True if it is decided by `now` to whom the first speech in line is, or if what is decided may be told."""
+        """True if it is decided before `now` to whom the first speech in line is, or if what is decided may be told.
+
+        What is due in this very instant waits for all that happens in it: who is silent then has not gone on.
+        """
         if not self._line:
             return False
         speech = self._undecided_first()
-        return not self._is_behind_others() if speech is None else self._decided_at(speech) <= now
+        return not self._is_behind_others() if speech is None else self._decided_at(speech) < now - ROUNDING
 
     def go_on(self, now: Seconds) -> None:
         """Tell all in line up to the next speech of which it is not known to whom it is."""
@@ -517,7 +515,7 @@ class Talk(KindRecognizer):
             if isinstance(item, OwnSpeech):
                 self._tell(item)
             else:
-                (item.step if isinstance(item, CutOff) else item)(self._conversation)
+                (item.step if isinstance(item, Ending) else item)(self._conversation)
         if not self._line:
             self._asked_in_line = inf
 
