@@ -52,7 +52,7 @@ class Entity(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     @property
     def extent(self) -> Meters:
-        """Radius: the one that is given, else that of the footprint."""
+        """The radius that is given, else that of the footprint."""
         if self.radius or not self.footprint:
             return self.radius
         return max(math.hypot(x, y) for x, y in self.footprint)
