@@ -161,13 +161,10 @@ class RobotTurn:
     ) -> Sent[bool | None]:
         """Refer to an object, by words, a look, or a point; to await: whether they have looked there.
 
-        Several objects are referred to at once: one look and one point at their middle.
-
         True: they have; False: not in time; None: nothing was shown, or nobody knows. `references` tell more.
 
-        object, others: their ids.
-        certainty: `high`: it must not be mistaken.
-        phrases: to choose from; none: the robot finds them.
+        object: its id. others: of what is shown with it at once, by one look and one point at their middle.
+        certainty: `high`: it must not be mistaken. phrases: to choose from; none: the robot finds them.
 
         Raises:
             InputRefused: the turn has ended, or has not begun.
