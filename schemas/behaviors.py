@@ -374,7 +374,7 @@ class SpeechOption(Struct, frozen=True, kw_only=True, omit_defaults=True):
 class Reference(Behavior, frozen=True, kw_only=True, tag="reference", omit_defaults=True):
     """An object reference. Generation replaces it by a phrase, perhaps with a gaze, a directed gaze or pointing.
 
-    target: id of the object.
+    target: id of the object; of several that are shown at once, their ids with ` + ` between.
     minimum_reliability: least probability, in (0, 1), that the target is understood; None: generation's default.
     options: the phrases to choose from; None: generation proposes some, from what the world knows of the target.
     """

@@ -376,7 +376,7 @@ class RobotState(Struct, frozen=True, kw_only=True, tag="robot_state", omit_defa
     """state and stream: control, the present state of the body, seldom and often.
 
     gaze: from the eyes. left_arm, right_arm: the forearms. None: it has no eyes, or no such arm.
-    looking_at: entity id; empty: nothing. speaking: the words that are being said; empty: silence.
+    looking_at: target of one entity or several; empty: nothing. speaking: words that are being said; empty: silence.
     """
 
     at: Stamp

@@ -4,12 +4,14 @@ An object that a report of the world leaves out has rarely gone: people's hands 
 5.4.2). So services remember it, and go on to speak of it and to look at it.
 """
 
+import math
+from statistics import fmean
 from typing import Literal
 
 from msgspec import Struct
 from msgspec.structs import replace
 
-from engage_hri.schemas.units import Coordinate, Extent, Heading, Named, Probability, Seconds, Stamp, Vector
+from engage_hri.schemas.units import Coordinate, Extent, Heading, Meters, Named, Probability, Seconds, Stamp, Vector
 
 EntityKind = Literal["object", "person", "hand", "surface"]
 
@@ -48,6 +50,22 @@ class Entity(Struct, frozen=True, kw_only=True, omit_defaults=True):
     confidence: Probability = 1.0
     placeless: bool = False
 
+    @property
+    def extent(self) -> Meters:
+        """The radius that is given, else that of the footprint."""
+        if self.radius or not self.footprint:
+            return self.radius
+        return max(math.hypot(x, y) for x, y in self.footprint)
+
+
+TOGETHER = " + "
+"""What stands between the ids of a target that is several things at once: `cup + plate`."""
+
+
+def each_of(target: str) -> tuple[str, ...]:
+    """Ids of what a target names: one thing, or several."""
+    return tuple(target.split(TOGETHER))
+
 
 class World(Struct, frozen=True, kw_only=True, tag="world", omit_defaults=True):
     """state: perception. The whole world each time it changes.
@@ -61,9 +79,16 @@ class World(Struct, frozen=True, kw_only=True, tag="world", omit_defaults=True):
     def entity(self, id: str) -> Entity | None:
         """Find the entity with this id; None if there is none.
 
-        id: of an object, a person, a hand or a surface.
+        id: of an object, a person, a hand or a surface; of several together, which are one object at their middle, as
+        wide as they lie apart.
         """
-        return next((entity for entity in self.entities if entity.id == id), None)
+        ids = each_of(id)
+        found = [entity for entity in self.entities if entity.id in ids]
+        if len(ids) == 1 or len(found) < len(ids):
+            return found[0] if len(ids) == 1 and found else None
+        x, y, z = (fmean(parts) for parts in zip(*(each.position for each in found), strict=True))
+        radius = max(math.dist((x, y, z), each.position) + each.extent for each in found)
+        return Entity(id=id, kind="object", position=(x, y, z), radius=radius)
 
     @property
     def objects(self) -> tuple[Entity, ...]:

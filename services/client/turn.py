@@ -34,6 +34,7 @@ from engage_hri.schemas.summary import Summary, summary
 from engage_hri.schemas.text import joined
 from engage_hri.schemas.tool import ANSWERS, Certainty, Expects, Part, Refer, ToolInput, fragment_of
 from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import TOGETHER
 from engage_hri.services.client.chunking import Chunk, Chunker
 from engage_hri.services.client.feeds import Feed, WorldFeed
 from engage_hri.services.client.inputs import shown
@@ -156,20 +157,19 @@ class RobotTurn:
         return self._whole(pieces, "middle", lambda outcome: joined(each.text for each in outcome.spoken))
 
     def refer(
-        self, object: str, *, certainty: Certainty = "normal", phrases: Iterable[str] = ()
+        self, object: str, *others: str, certainty: Certainty = "normal", phrases: Iterable[str] = ()
     ) -> Sent[bool | None]:
         """Refer to an object, by words, a look, or a point; to await: whether they have looked there.
 
         True: they have; False: not in time; None: nothing was shown, or nobody knows. `references` tell more.
 
-        object: its id.
-        certainty: `high`: it must not be mistaken.
-        phrases: to choose from; none: the robot finds them.
+        object: its id. others: of what is shown with it at once, by one look and one point at their middle.
+        certainty: `high`: it must not be mistaken. phrases: to choose from; none: the robot finds them.
 
         Raises:
             InputRefused: the turn has ended, or has not begun.
         """
-        part = Refer(refer=object, certainty=certainty, phrases=tuple(phrases))
+        part = Refer(refer=TOGETHER.join((object, *others)), certainty=certainty, phrases=tuple(phrases))
         return self._whole([part], "middle", lambda outcome: next((each.looked for each in outcome.references), None))
 
     def ask(

@@ -28,7 +28,7 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import EVERYBODY, TurnFragment
 from engage_hri.schemas.references import SyncRef, rewritten
 from engage_hri.schemas.tool import in_call
-from engage_hri.schemas.world import World
+from engage_hri.schemas.world import TOGETHER, World, each_of
 from engage_hri.services.generation.references.phrases import noun_in
 from engage_hri.services.text.ear import heard, is_spoken
 from engage_hri.services.text.marks import Piece, problems
@@ -71,6 +71,9 @@ def renamed(fragment: TurnFragment, name: Callable[[Name], str]) -> TurnFragment
     def named(id: str, kind: Kind, path: str, line: int) -> str:
         return name(Name(id, kind, path, line)) if id else id
 
+    def target(together: str, kind: Kind, path: str, line: int) -> str:
+        return TOGETHER.join(named(id, kind, path, line) for id in each_of(together))
+
     def option(each: SpeechOption, path: str, line: int) -> SpeechOption:
         ids = [
             named(id, "object", f"{path}.distractors[{place}]", each.line or line)
@@ -80,12 +83,12 @@ def renamed(fragment: TurnFragment, name: Callable[[Name], str]) -> TurnFragment
 
     def behavior(each: FragmentBehavior, path: str) -> FragmentBehavior:
         if isinstance(each, Aimed):
-            return replace(each, target=named(each.target, "entity", f"{path}.target", each.line))
+            return replace(each, target=target(each.target, "entity", f"{path}.target", each.line))
         if not isinstance(each, Reference):
             return each
         options = [option(one, f"{path}.options[{n}]", each.line) for n, one in enumerate(each.options or ())]
-        target = named(each.target, "object", f"{path}.target", each.line)
-        return replace(each, target=target, options=None if each.options is None else tuple(options))
+        objects = target(each.target, "object", f"{path}.target", each.line)
+        return replace(each, target=objects, options=None if each.options is None else tuple(options))
 
     def people(ids: str | tuple[str, ...], path: str) -> str | tuple[str, ...]:
         if isinstance(ids, str):
@@ -170,9 +173,10 @@ def _bearable(behavior: FragmentBehavior, ids: Ids, warnings: list[str]) -> Frag
     """The behavior, or what is done in its place; a wait takes no time, but others may be tied to it."""
     if isinstance(behavior, Reference):
         behavior = _with_words(behavior, ids, warnings)
-        return behavior if behavior.target in ids["object"] else _as_speech(behavior, ids, warnings)
-    if isinstance(behavior, Aimed) and behavior.target not in ids["entity"]:
-        warnings.append(f"{behavior.id}: {_unknown(behavior.target, 'entity', ids)}; left out")
+        missing = _missing(behavior.target, "object", ids)
+        return _as_speech(behavior, missing, ids, warnings) if missing else behavior
+    if isinstance(behavior, Aimed) and (missing := _missing(behavior.target, "entity", ids)):
+        warnings.append(f"{behavior.id}: {_unknown(missing, 'entity', ids)}; left out")
         begins = tuple(each for each in behavior.timing if each.sync == "start")
         return Wait(id=behavior.id, duration=0.0, timing=begins, line=behavior.line)
     return behavior
@@ -193,10 +197,16 @@ def _with_words(reference: Reference, ids: Ids, warnings: list[str]) -> Referenc
     return reference if tuple(kept) == (reference.options or ()) else replace(reference, options=tuple(kept) or None)
 
 
-def _as_speech(reference: Reference, ids: Ids, warnings: list[str]) -> Speech:
-    text = next((each.text for each in reference.options or () if is_spoken(each.text)), noun_in(reference.target))
+def _missing(target: str, kind: Kind, ids: Ids) -> str:
+    """The first of a target's ids that names nothing of this kind; "": all do."""
+    return next((id for id in each_of(target) if id not in ids[kind]), "")
+
+
+def _as_speech(reference: Reference, missing: str, ids: Ids, warnings: list[str]) -> Speech:
+    nouns = " and ".join(filter(None, map(noun_in, each_of(reference.target))))
+    text = next((each.text for each in reference.options or () if is_spoken(each.text)), nouns)
     how = f"only said: {text!r}" if text else "left out"
-    warnings.append(f"{reference.id}: {_unknown(reference.target, 'object', ids)}; {how}")
+    warnings.append(f"{reference.id}: {_unknown(missing, 'object', ids)}; {how}")
     return Speech(id=reference.id, text=text, timing=reference.timing, line=reference.line)
 
 

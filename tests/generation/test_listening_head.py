@@ -91,14 +91,18 @@ def test_who_speaks_gets_the_eyes_at_once_from_who_has_only_looked_or_has_finish
     stage.until(15.0)
     assert stage.owners == [(12.0, "response", "ben"), (12.3, "response", "cem"), (14.3, "response", "ben")]
 
-    both = company()
-    speak(both, 12.0, "ben")
-    look_at(both, "cem", "robot")
-    speak(both, 12.3, "ben", "cem")
-    both.until(15.0)
-    assert both.owners[-2:] == [(12.2, "response", "ben"), (13.0, "response", "cem")], (
-        "of two who speak each has 0.8 s"
-    )
+
+@pytest.mark.parametrize("looks_back", [13.5, 12.7])
+def test_of_two_who_speak_the_eyes_are_on_who_looks_at_it_and_stay_where_both_do(looks_back: float) -> None:
+    stage = company()
+    speak(stage, 12.0, "ben")
+    look_at(stage, "cem", "robot")
+    speak(stage, 12.3, "ben", "cem")
+    stage.until(looks_back)
+    look_at(stage, "ben", "robot")
+    stage.until(15.0)
+
+    assert stage.owners[-2:] == [(12.2, "response", "ben"), (12.5, "response", "cem")]
 
 
 def test_it_looks_at_the_speaker_soon_and_comes_back_after_the_speech() -> None:

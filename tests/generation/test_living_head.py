@@ -159,6 +159,20 @@ def test_eyes_that_it_has_sought_and_met_are_not_left_for_a_hand(off: tuple[str,
     assert on_hand == pytest.approx(left + (DWELL if not off else 0.0))
 
 
+@pytest.mark.parametrize(("to", "left"), [("robot", 5.4), ("ann", 5.0 + MUTUAL)])
+def test_eyes_that_it_has_met_are_left_for_who_may_speak_to_it(to: str, left: float) -> None:
+    stage = before_a_table("aversion", "hands")
+    stage.until(5.0)
+    met = {"kind": "mutual_facial_gaze", "initiator": "robot", "responder": "ann", "objects": ()}
+    stage.feed(event("gaze", "started", **met), event("gaze", "succeeded", **met))
+    stage.until(5.2)
+    speak(stage, "ben", to=to)
+    stage.until(8.0)
+
+    assert stage.owners[-1][2] == "ben"
+    assert stage.owners[-1][0] == pytest.approx(left)
+
+
 # -- nods ---------------------------------------------------------------------------------------------------------
 
 

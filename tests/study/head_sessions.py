@@ -11,9 +11,11 @@ from operator import add
 from engage_hri.schemas import keys
 from engage_hri.schemas.messages import Message
 from engage_hri.services.bus.memory import MemoryHub
-from engage_hri.services.commandline.embedding import tangram
+from engage_hri.services.commandline.embedding import services
 from engage_hri.services.commandline.shell.config import Config
+from engage_hri.services.commandline.shell.roster import PLAY
 from engage_hri.services.runtime.configuration import read
+from engage_hri.services.runtime.service import Service, running
 from engage_hri.services.runtime.virtual_time import run_virtual
 from tests.study.robot_head import HeadFindings, findings
 
@@ -34,10 +36,11 @@ def session(seed: int, people: int = 0, settings: tuple[str, ...] = ()) -> list[
     return run_virtual(played(config))
 
 
-async def played(config: Config) -> list[Message]:
+async def played(config: Config, **instead: Service) -> list[Message]:
+    """All that is on the bus until the task is over. instead: services in place of those with these names."""
     async with MemoryHub(config.robot, decodes=False) as hub:
         with hub.join("annotator").subscribe(keys.EVERYTHING, capacity=10**7) as inbox:
-            async with tangram(config, (), hub) as over:
+            async with running(hub, services(config, *PLAY) | instead) as over:
                 await over.wait()
                 await asyncio.sleep(5.0)  # answers to the goodbye
             messages = []

@@ -7,7 +7,7 @@ them: to whom a turn was. What the head was ordered to do, and why, is not read.
 
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -64,8 +64,20 @@ def shared(one: Span, others: Iterable[Span]) -> Iterator[Span]:
             yield Span(began, ended, other.what)
 
 
-def seconds(one: Span, others: Iterable[Span]) -> float:
-    return sum(each.length for each in shared(one, others))
+def seconds(one: Span, other: Span) -> float:
+    """Length of what two have in common."""
+    return max(0.0, min(one.ended, other.ended) - max(one.began, other.began))
+
+
+def moments(speeches: Sequence[Span], looks: Sequence[Span]) -> Iterator[tuple[Span, frozenset[str]]]:
+    """Parts of the time in which somebody speaks: each with what the eyes rest on, and all who speak then.
+
+    Eyes are at one place only: of two who speak to the robot at once, either is who speaks to it.
+    """
+    for began, ended in pairwise(sorted({at for each in (*speeches, *looks) for at in (each.began, each.ended)})):
+        if who := frozenset(each.what for each in speeches if each.began <= began and ended <= each.ended):
+            on = (look.what for look in looks if look.began <= began and ended <= look.ended)
+            yield Span(began, ended, next(on, "")), who
 
 
 class HeadFindings(NamedTuple):
@@ -83,9 +95,9 @@ class HeadFindings(NamedTuple):
     turns_soon: int
     """Turns within half a second after whose last word they did."""
     heard: float
-    """Seconds for which people spoke to the robot."""
+    """Seconds for which somebody spoke to the robot."""
     heard_on_face: float
-    """Seconds of these in which the eyes rested on who spoke."""
+    """Seconds of these in which the eyes rested on one who did."""
     aways: tuple[float, ...]
     """Lengths of looks away from a face, until the next look at a face. A turn from one face to another, without a
     look at anything between, is none: a head takes half a second for it."""
@@ -137,7 +149,7 @@ def findings(messages: list[Message], robot: str = "robot") -> HeadFindings:
     on_face = [_is_on(looks, at, to or people) for at, to in ends]
     soon = [_is_on(looks, at, to or people, 0.5) for at, to in ends]
     at_faces = [each for each in looks if each.what in people]
-    heard = list(to_robot(messages, robot))
+    heard = list(moments(list(to_robot(messages, robot)), looks))
     following = dict(pairwise(looks))
     gaps = (
         later.began - one.ended
@@ -159,8 +171,8 @@ def findings(messages: list[Message], robot: str = "robot") -> HeadFindings:
         turns=len(ends),
         turns_on_face=sum(on_face),
         turns_soon=sum(soon),
-        heard=sum(each.length for each in heard),
-        heard_on_face=sum(seconds(each, (look for look in looks if look.what == each.what)) for each in heard),
+        heard=sum(each.length for each, _ in heard),
+        heard_on_face=sum(each.length for each, who in heard if each.what in who),
         aways=tuple(gap for gap in gaps if gap > AT_ONCE),
         mutual=len(mutual),
         broken_by_hands=len(broken),

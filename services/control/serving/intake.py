@@ -63,7 +63,7 @@ from engage_hri.schemas.perception import ActionBegan, ActionEnded, OngoingActio
 from engage_hri.schemas.recognition import SamePeople
 from engage_hri.schemas.requests import Accepted, Cancel, Refused
 from engage_hri.schemas.units import Seconds, Stamp
-from engage_hri.schemas.world import COVERED_FOR, CoveredObjects, World
+from engage_hri.schemas.world import COVERED_FOR, CoveredObjects, World, each_of
 from engage_hri.services.control.config import ControlConfig
 from engage_hri.services.control.contract.body import AbortMode, Arrived, Progress, Reached, Revocation, Spoke
 from engage_hri.services.control.contract.refusals import refusal
@@ -505,7 +505,7 @@ class ActionReporter:
         targets: tuple[str, ...]
         match behavior:
             case Pointing(target=target):
-                action, targets, first, last = "point", (target,), "stroke_start", "stroke_end"
+                action, targets, first, last = "point", each_of(target), "stroke_start", "stroke_end"
             case Head(lexeme=lexeme) if (known := _HEADS.get(lexeme.upper())) is not None:
                 action, targets, first, last = known, (), "stroke_start", "stroke_end"
             case Speech():
@@ -526,10 +526,11 @@ class ActionReporter:
 
         label: `block:behavior` that brought the eyes there; empty: unknown.
         """
-        if entity == (self._look.targets[0] if self._look else ""):
+        targets = each_of(entity) if entity else ()
+        if targets == (self._look.targets if self._look else ()):
             return []
         messages: list[ActionMessage] = [self._end(self._look, at)] if self._look else []
-        self._look = self._began("look", (entity,), label, at) if entity else None
+        self._look = self._began("look", targets, label, at) if targets else None
         return [*messages, self._look] if self._look else messages
 
     def _began(self, action: Action, targets: tuple[str, ...], label: str, at: Seconds) -> ActionBegan:

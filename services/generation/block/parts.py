@@ -17,6 +17,7 @@ from engage_hri.schemas.behaviors import (
 )
 from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
 from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.world import each_of
 from engage_hri.services.generation.block.rewriting import Operator, Point, Replacement
 from engage_hri.services.generation.turns.plan import TurnPlan
 
@@ -117,7 +118,7 @@ class Parts:
                 id="",
                 kind="directed_gaze",
                 responder="",
-                objects=(reference.target,),
+                objects=each_of(reference.target),
                 cause="reference",
                 anchors=tuple(anchors),
                 turn=turn.turn,

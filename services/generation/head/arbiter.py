@@ -344,10 +344,8 @@ class Arbiter:
         rests = self._rests_since
         ends = self._looks_since + ON_THE_WAY if rests is None else rests + LEAST_FIXATION
         faces = {self._owner.target, wanted.target}
-        is_stronger = wanted.priority < self._owner.priority
-        if self._owner.kind == wanted.kind and wanted.target == self._scene.listens_to:
-            # Who speaks goes before who has only looked, or speaks no longer.
-            is_stronger = self._owner.target not in self._scene.speaking
+        is_speaker = self._owner.kind == wanted.kind and wanted.target == self._scene.listens_to
+        is_stronger = wanted.priority < self._owner.priority or is_speaker
         if faces <= {*self._scene.sight.present(now)} and wanted.kind in ("response", "face") and not is_stronger:
             return max(ends, self._looks_since + LEAST_LOOK)
         return ends

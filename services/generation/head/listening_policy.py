@@ -2,9 +2,9 @@
 
 Of those who speak it looks at who is not known to speak to somebody else, and looks at the robot: in groups of four,
 whom a speaker looks at is in 77 of 100 looks the addressee (Vertegaal and others, CHI 2001), and to whom a short
-speech is recognition knows only when it is over. Of several of these it looks at who spoke first. While it waits for
-an answer only those whom it asked draw it, and when one of them speaks, only that one; while somebody speaks to it
-nobody else does.
+speech is recognition knows only when it is over. Of several of these it stays with the one who has its eyes, else it
+looks at who spoke first. While it waits for an answer only those whom it asked draw it, and when one of them speaks,
+only that one; while somebody speaks to it nobody else does.
 """
 
 from collections.abc import Sequence
@@ -52,7 +52,6 @@ class ListeningPolicy(HeadPolicy):
         elif isinstance(message, Floor):
             known, self._speaking = self._speaking, {each.actor: now for each in message.speeches}
             self._speaking |= {who: since for who, since in known.items() if who in self._speaking}
-            self.scene.speaking = tuple(self._speaking)
             self._to_others = {each.actor for each in message.speeches if each.to and self.scene.robot not in each.to}
             asked = self.scene.asked if self.scene.waits else ()
             self.scene.to_robot = tuple(
@@ -92,8 +91,10 @@ class ListeningPolicy(HeadPolicy):
         draws = self.scene.drawing(now)
         heard = [who for who, since in self._speaking.items() if who in draws and now >= since + ONSET]
         if heard:
-            # The first of the best: `heard` is in the order in which they began.
-            likely = min(heard, key=lambda who: (who in self._to_others, who not in self._looking))
+            # The first of the best, for `heard` is in the order in which they began, unless another has the eyes.
+            likely = min(
+                heard, key=lambda who: (who in self._to_others, who not in self._looking, who != self._speaker)
+            )
             self._speaker, self._until = likely, None
         elif self._speaker not in draws:
             self._speaker = ""

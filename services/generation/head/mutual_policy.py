@@ -4,7 +4,7 @@ The robot looks at somebody at the end of a turn, or to check whether they atten
 mutual facial gaze of thesis 2.2.2, and the robot has asked for it. People's last 1.8 s at the median. A hand that
 moves at that instant, often one that begins to do what was asked for, would draw the robot's eyes away after a tenth
 of a second, as from somebody whom it did not mean. What somebody shows the robot counts more (the response policy
-comes first).
+comes first), and so does another one who speaks, maybe to the robot.
 """
 
 from collections.abc import Sequence
@@ -46,6 +46,7 @@ class MutualGazePolicy(HeadPolicy):
         return self._until if self._person else None
 
     def claim(self, now: Seconds, weaker: Sequence[Claim]) -> Claim | None:
-        if now >= self._until or self.scene.head_on != self._person:
+        is_called_away = self.scene.listens_to not in ("", self._person)
+        if now >= self._until or self.scene.head_on != self._person or is_called_away:
             self._person = ""
         return self.wish(self._person, f"has met the eyes of {self._person}") if self._person else None

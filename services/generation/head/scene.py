@@ -111,8 +111,6 @@ class HeadScene:
         """True while a turn of the robot goes on, pauses included, or is to begin."""
         self.to_robot: tuple[str, ...] = ()
         """Those of whom it is known that they speak to the robot now, if a policy cares for that."""
-        self.speaking: tuple[str, ...] = ()
-        """Those who speak now, the robot too, if a policy cares for that."""
         self.listens_to = ""
         """Who is heard, and may speak to the robot: to whom is known late, of short speeches when they are over."""
         self.signed: dict[str, Seconds] = {}
@@ -141,7 +139,7 @@ class HeadScene:
 
     def recognition_lost(self) -> None:
         """Drop what recognition told: the ends of its events and speeches will never come."""
-        self.to_robot, self.speaking, self.listens_to, self._asked = (), (), "", {}
+        self.to_robot, self.listens_to, self._asked = (), "", {}
 
     def join(self, other: str, name: str) -> None:
         """Take two ids for one person, who is called `name` from now on."""

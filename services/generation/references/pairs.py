@@ -11,15 +11,16 @@ from typing import get_args
 
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from engage_hri.schemas.behaviors import Reference, SpeechOption
 from engage_hri.schemas.body import Estimate, NoPointZone, Ray
 from engage_hri.schemas.fragments import GestureChoice
 from engage_hri.schemas.units import Meters, Probability, Radians, Seconds, Vector
-from engage_hri.schemas.world import Entity, World
+from engage_hri.schemas.world import Entity, World, each_of
 from engage_hri.services.generation.config import GenerationConfig
-from engage_hri.services.generation.references.motions import CURRENT_POSE, Motions, Way
+from engage_hri.services.generation.references.motions import CURRENT_POSE, PARTS, Motions, Way
 
 TOLERANCE = 1e-9
 """Slack of an angle or distance: an object exactly on the edge is inside, whatever the rounding."""
@@ -54,7 +55,7 @@ def laid_out(objects: Sequence[Entity]) -> Layout:
         places=_vectors(places),
         owner=np.array(owner, dtype=np.intp),
         centres=_vectors([entity.position for entity in objects]),
-        radii=np.array([extent(entity) for entity in objects]),
+        radii=np.array([entity.extent for entity in objects]),
     )
 
 
@@ -88,13 +89,6 @@ def in_pointing_cylinders(forearms: Sequence[Ray], radius: Meters, layout: Layou
     wider = np.tan([forearm.error for forearm in forearms])[:, None] * from_elbow.clip(min=0.0)
     inside = (along >= -TOLERANCE) & (off_axis <= radius + wider + layout.radii + TOLERANCE)
     return [frozenset(layout.ids[index] for index in np.flatnonzero(each).tolist()) for each in inside]
-
-
-def extent(entity: Entity) -> Meters:
-    """Radius of an object: the one that is given, else that of its footprint."""
-    if entity.radius or not entity.footprint:
-        return entity.radius
-    return max(math.hypot(x, y) for x, y in entity.footprint)
 
 
 def in_zone(place: Vector, zones: Iterable[NoPointZone]) -> bool:
@@ -211,12 +205,26 @@ class Shown(Struct, frozen=True):
 
 def shown(targets: Sequence[str], scene: ReferenceScene, motions: Motions) -> dict[str, Shown]:
     """Objects that gazes and points at the targets may seem to mean."""
-    gazes = {each: ray for each in targets if (ray := motions.known[Way("head", CURRENT_POSE, each)].ray) is not None}
-    points = {each: ray for each in targets if (ray := motions.known[Way("arm", CURRENT_POSE, each)].ray) is not None}
+    gazes, points = (
+        {
+            each: _widened(ray, each, scene)
+            for each in targets
+            if (ray := motions.known[Way(part, CURRENT_POSE, each)].ray)
+        }
+        for part in PARTS
+    )
     cones = in_gaze_cones(list(gazes.values()), scene.half_angle, scene.layout)
     cylinders = in_pointing_cylinders(list(points.values()), scene.pointing_radius, scene.layout)
     gazed, pointed = dict(zip(gazes, cones, strict=True)), dict(zip(points, cylinders, strict=True))
     return {each: Shown(gazed.get(each), pointed.get(each)) for each in targets}
+
+
+def _widened(ray: Ray, target: str, scene: ReferenceScene) -> Ray:
+    """The ray of a gesture at several things, which may mean all that lies about their middle as far as they do."""
+    group = scene.world.entity(target) if len(each_of(target)) > 1 else None
+    if group is None:
+        return ray
+    return replace(ray, error=ray.error + math.atan2(group.extent, math.dist(ray.origin, group.position)))
 
 
 def considered(
@@ -226,11 +234,11 @@ def considered(
 
     seems: what a gaze and a point at its target may seem to mean.
     """
-    target = reference.target
-    universe = scene.universe - {target}
-    gazed = universe if seems.gazed is None else seems.gazed - {target}
-    pointed = universe if seems.pointed is None else seems.pointed - {target}
-    no_gaze, no_point = _obstacles(target, scene, motions)
+    meant = {*each_of(reference.target)}
+    universe = scene.universe - meant
+    gazed = universe if seems.gazed is None else seems.gazed - meant
+    pointed = universe if seems.pointed is None else seems.pointed - meant
+    no_gaze, no_point = _obstacles(reference.target, scene, motions)
     said = [
         universe.intersection(option.distractors) if option.text and not option.deictic else universe
         for option in reference.options or ()
@@ -339,7 +347,7 @@ def deictic_warnings(references: Collection[Reference], scene: ReferenceScene) -
         for option in reference.options or ()
         if option.deictic
         and option.distractors
-        and set(option.distractors) - {reference.target} != scene.universe - {reference.target}
+        and set(option.distractors).symmetric_difference(scene.universe) - {*each_of(reference.target)}
     ]
 
 

@@ -22,9 +22,8 @@ from engage_hri.schemas.behaviors import Reference, SpeechOption
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.text import word_count
 from engage_hri.schemas.units import Meters
-from engage_hri.schemas.world import Entity, World
+from engage_hri.schemas.world import Entity, World, each_of
 from engage_hri.services.generation.config import PhraseAttribute
-from engage_hri.services.generation.references.pairs import extent
 
 
 class Named(Struct, frozen=True):
@@ -121,10 +120,10 @@ def proposed(references: Sequence[Reference], world: World, discourse: Discourse
         if reference.options is None:
             is_the_topic = discourse.topic == reference.target
             options = phrases(reference.target, objects, is_the_topic=is_the_topic)
-            if not objects.describes(reference.target):
-                called = _phrase(objects.noun(reference.target), ())
+            for unknown in (each for each in each_of(reference.target) if not objects.describes(each)):
+                called = _phrase(objects.noun(unknown), ())
                 warnings.append(
-                    f"{reference.id}: the world does not say what {reference.target} is, so it is {called!r}: "
+                    f"{reference.id}: the world does not say what {unknown} is, so it is {called!r}: "
                     "give the entity a category or a name"
                 )
             reference = replace(reference, options=options)
@@ -138,6 +137,8 @@ def phrases(target: str, objects: "_Objects", *, is_the_topic: bool = False) -> 
 
     is_the_topic: the target alone was mentioned before, so that "it" can mean nothing else.
     """
+    if len(ids := each_of(target)) > 1:
+        return _phrases_together(ids, objects)
     options = [_option("it", frozenset())] if is_the_topic else []
     demonstrative = "this" if objects.distance(target) <= THIS_WITHIN else "that"
     if not objects.describes(target) and not objects.noun(target).word:
@@ -145,6 +146,17 @@ def phrases(target: str, objects: "_Objects", *, is_the_topic: bool = False) -> 
     # The distractors of a deictic phrase are those of pointing: the reference policy computes them.
     options.append(SpeechOption(text=demonstrative, cost=word_count(demonstrative), deictic=True))
     return (*options, *_descriptions(target, objects))
+
+
+def _phrases_together(ids: Sequence[str], objects: "_Objects") -> tuple[SpeechOption, ...]:
+    """Phrases for several objects at once: "these", and what tells each one best, "the cup and the red plate"."""
+    demonstrative = "these" if all(objects.distance(each) <= THIS_WITHIN for each in ids) else "those"
+    best = [min(_descriptions(each, objects), key=lambda option: len(option.distractors)) for each in ids]
+    others = frozenset(id for each in best for id in each.distractors) - {*ids}
+    return (
+        SpeechOption(text=demonstrative, cost=1, deictic=True),
+        _option(" and ".join(each.text for each in best), others),
+    )
 
 
 def _descriptions(target: str, objects: "_Objects") -> Iterator[SpeechOption]:
@@ -256,12 +268,12 @@ def _sizes(objects: Sequence[Entity]) -> dict[str, str]:
     """Sizes `big` and `small` by id, within each kind of object; none where all are about the same size."""
     kinds: dict[str, list[Entity]] = {}
     for entity in objects:
-        if extent(entity) > 0:
+        if entity.extent > 0:
             kinds.setdefault(_noun(entity), []).append(entity)
     sizes: dict[str, str] = {}
     for members in kinds.values():
-        ordered = sorted(members, key=extent)
-        steps = [extent(larger) / extent(smaller) for smaller, larger in pairwise(ordered)]
+        ordered = sorted(members, key=lambda each: each.extent)
+        steps = [larger.extent / smaller.extent for smaller, larger in pairwise(ordered)]
         if steps and max(steps) >= SIZES_APART:
             split = steps.index(max(steps)) + 1
             sizes |= {entity.id: "small" if place < split else "big" for place, entity in enumerate(ordered)}

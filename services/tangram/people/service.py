@@ -48,7 +48,7 @@ async def simulate(
         tell_settings(bus, "simulation", config)
         party = Party(NAMES[: config.people], random.Random(config.seed), bus.robot, bus.run)
         party.begin(bus.now())
-        await show_company(bus, ready, _table_with(party.people), party)
+        await show_company(bus, ready, table_with(party.people), party)
         return
     table = Table(tangram_table())
     human = _human(config, habits, bus.robot, random.Random(config.seed))
@@ -81,7 +81,7 @@ async def simulate(
             perceived.follow(reports)
 
 
-def _table_with(people: Iterable[str]) -> World:
+def table_with(people: Iterable[str]) -> World:
     """The table with these people around it."""
     entities = [each for each in table_world().entities if each.kind in ("object", "surface")]
     seats: list[Vector] = []
