@@ -74,11 +74,11 @@ BARE = 0.06
 LEAST, SAME = 1.0, 1.3
 """Score of what is a piece at all; and of one that is where it was, so that it is not looked for. At most it is 2."""
 RIVAL = 0.2
-"""Difference of scores up to which all pixels around decide: a trapezoid is nearly a triangle, and its walls can make
-up for its missing corner."""
+"""Difference of scores up to which all pixels around decide: a trapezoid is nearly a triangle, and the foot of a wall
+looks like the edge of a top."""
 LEAST_AGREED, CLOSE = 0.4, 0.05
-"""Share of all colors around that a piece explains at least; and its difference up to which it is not known which of
-two places it is."""
+"""Share of the colors around that a piece explains at least; and difference of it up to which it is not known which
+of two places is that of the piece."""
 AGAIN = 10
 """Pictures after which a piece is looked for everywhere, whatever its score."""
 PLACE_KNOWN: Meters = 0.003
@@ -87,7 +87,7 @@ TURN_KNOWN: Radians = math.radians(3.0)
 
 
 class _Laid(NamedTuple):
-    """A form at a place. score: how well it explains the colors there. hidden: share of it that nothing is known of."""
+    """A form at a place. score: how well it explains the colors there. hidden: share of it of which none is known."""
 
     pose: Floats
     score: float
@@ -228,15 +228,15 @@ class _Shape:
         self.inside = lattice[depth < -0.0025]
         self.beyond, self.beyond_normals = self.points + 0.004 * self.normals, self.normals
 
+    def is_same(self, pose: Floats, other: Floats) -> bool:
+        """Tell whether two poses are one, as far as it is known where a piece lies."""
+        turn = math.remainder(pose[2] - other[2], math.tau / self.form.turns_alike)
+        return math.dist(pose[:2], other[:2]) <= 2 * PLACE_KNOWN and abs(turn) <= 2 * TURN_KNOWN
+
 
 def _turning(angle: float) -> Floats:
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, s], [-s, c]])
-
-
-def _is_elsewhere(shape: _Shape, pose: Floats, other: Floats) -> bool:
-    turn = math.remainder(pose[2] - other[2], math.tau / shape.form.turns_alike)
-    return math.dist(pose[:2], other[:2]) > 2 * PLACE_KNOWN or abs(turn) > 2 * TURN_KNOWN
 
 
 class PieceFinder:
@@ -294,7 +294,8 @@ class PieceFinder:
         """Find the pieces of one color: the one that explains most first; what it explains is no other's."""
         value = np.where(labels == number, 1.0, np.where(labels == UNKNOWN, 0.0, -1.0)).astype(np.float32)
         tops = self._tops(tone, value)
-        seen, found, left = _Seen(flat, value, tops, covered), list[tuple[SpottedPiece, _Shape, Floats]](), value.copy()
+        found, left = list[tuple[SpottedPiece, _Shape, Floats]](), value.copy()
+        seen = _Seen(flat, value, tops, covered)
         looks_everywhere = (self._count + number) % AGAIN == 0
         waiting = {shape.form.id: shape for shape in shapes}
         best = {id: self._where_it_was(seen, shape) for id, shape in waiting.items()}
@@ -312,7 +313,7 @@ class PieceFinder:
             seen = seen._replace(value=left, tops=np.minimum(tops, left))
             best = {each: self._judged(seen, shape, best[each]) for each, shape in waiting.items()}
             looks_everywhere = False
-        return [piece for piece, *laid in found if self._agreement(value, left, *laid) > LEAST_AGREED]
+        return [each for each, shape, pose in found if self._agreement(value, left, shape, pose) > LEAST_AGREED]
 
     # -- where a form may lie ---------------------------------------------------------------------------------------
 
@@ -328,21 +329,21 @@ class PieceFinder:
             *(self._moved(seen, shape, each) for each in self._likely(seen.tops, shape)),
         ]
         best = max(tried, key=lambda laid: laid.score)
-        # One edge of a top and the foot of another wall may agree on a place beside the right one.
-        if best.score > 0:
-            wall = np.array([*(best.pose[:2] - self._sunk(best.pose[:2])), 0.0])
-            tried += [self._moved(seen, shape, best.pose + step) for step in (*BESIDE, wall, -wall)]
-        most = max(laid.score for laid in tried)
-        rivals = [laid for laid in tried if laid.score > max(0.0, most - RIVAL - laid.hidden)]
-        agreements = [self._agreement(seen.value, seen.value, shape, laid.pose) for laid in rivals]
-        if not rivals:
+        if best.score <= 0:
             return best
-        chosen = rivals[int(np.argmax(agreements))]
-        close = max(agreements) - CLOSE
-        for laid, agreement in zip(rivals, agreements, strict=True):
-            if agreement > close and _is_elsewhere(shape, laid.pose, chosen.pose):
-                return chosen._replace(score=0.0)
-        return chosen
+        # One edge of a top and the foot of another wall may agree on a place beside the right one.
+        wall = np.array([*(best.pose[:2] - self._sunk(best.pose[:2])), 0.0])
+        tried += [self._moved(seen, shape, best.pose + step) for step in (*BESIDE, wall, -wall)]
+        least = max(laid.score for laid in tried) - RIVAL
+        agreed = [
+            (self._agreement(seen.value, seen.value, shape, laid.pose), laid)
+            for laid in tried
+            if laid.score > max(0.0, least - laid.hidden)  # what is hidden might have its color
+        ]
+        most, best = max(agreed, key=lambda each: each[0])
+        as_well = (laid for agreement, laid in agreed if agreement > most - CLOSE)
+        is_sure = all(shape.is_same(laid.pose, best.pose) for laid in as_well)
+        return best if is_sure else best._replace(score=0.0)
 
     def _agreement(self, value: Any, left: Any, shape: _Shape, pose: Floats) -> float:
         """Judge how well a form there explains all colors around, by its top and its walls: share of what is known
@@ -357,8 +358,8 @@ class PieceFinder:
         covers, is_top = np.zeros(value.shape, np.uint8), np.zeros(value.shape, np.uint8)
         for mask, points in ((covers, outline), (is_top, top[:, ::-1])):
             cv2.fillConvexPoly(mask, np.rint(points - low - 0.5).astype(np.int32), 1)
-        own = float(((value > 0) & (covers > 0)).sum())
-        against = float(((value < 0) & (is_top > 0)).sum() + ((left > 0) & (covers == 0)).sum())
+        own = int(((value > 0) & (covers > 0)).sum())
+        against = int(((value < 0) & (is_top > 0)).sum() + ((left > 0) & (covers == 0)).sum())
         return (own - against) / max(own + against, 1)
 
     def _tops(self, tone: Any, value: Any) -> Any:
