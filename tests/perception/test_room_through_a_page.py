@@ -1,9 +1,10 @@
 """Appendix B through a page, in real time: Chromium's camera and microphone have the person, and nothing else tells
 what they look at and say.
 
-    python -m pytest -s tests/perception/test_room_through_a_page.py
+    UNTIL=step-25 SHOT=page.png python -m pytest -s tests/perception/test_room_through_a_page.py
 
-prints what was told, and when, and what the person really looked at. Chromium reads a film picture by picture, again
+plays the whole task, prints what was told, and when, and what the person really looked at, and keeps a picture of the
+page at the end. Chromium reads a film picture by picture, again
 and again, and a sound when its microphone is switched on. So the film has two pictures, which are written anew while
 it is shown, and the person presses the microphone for each thing that they say. Pieces and hands are told, for this
 page has no camera over the table.
@@ -65,8 +66,10 @@ BEFORE, AFTER = 0.5, 1.5
 """Seconds of silence before and after what is said, in which the microphone is on."""
 QUIET = 60.0
 """Seconds of silence that a microphone hears behind that."""
-PATIENCE = 240.0
-"""Seconds until the person has been understood: the second answer is due after 90 of them."""
+UNTIL = os.environ.get("UNTIL", "step-8-ours")
+"""The fragment to which the task is played."""
+PATIENCE = 330.0
+"""Seconds for the whole task, which takes 170 on two processors that have much other work."""
 Told = TypeVar("Told", bound=Message)
 
 
@@ -287,9 +290,8 @@ def keep(path: str, picture: bytes) -> None:
 async def test_the_task_goes_on_by_what_a_page_sees_and_hears(place: Place):
     """The first pieces are laid as the robot asks; who answers is understood; looks go to and fro."""
     async with sitting(place) as (page, watched):
-        words = {*WORDS.values()}
         try:
-            await watched.until(lambda: words & {each.text for each in watched.of(Utterance)} != set(), PATIENCE)
+            await watched.until(lambda: UNTIL in {each.fragment for each in watched.of(FragmentOutcome)}, PATIENCE)
         finally:
             watched.show()
             print("load", os.getloadavg()[0])
@@ -298,10 +300,12 @@ async def test_the_task_goes_on_by_what_a_page_sees_and_hears(place: Place):
 
     faces = [len(each.faces) for each in watched.of(FaceLandmarks)]
     looks = [each.targets for each in watched.of(ActionBegan) if each.action == "look" and each.actor == PERSON]
-    done = {each.fragment for each in watched.of(FragmentOutcome) if each.status == "done"}
+    status = {each.fragment: each.status for each in watched.of(FragmentOutcome)}
     events = {(each.kind, each.initiator, each.state) for each in watched.of(ConnectionEvent)}
     assert np.mean(faces[faces.index(1) :]) > 0.97
-    assert {"step-3", "step-5"} <= done
+    assert {*status.values()} == {"done"}
+    assert {each.text for each in watched.of(Utterance) if each.final} & {*WORDS.values()}
+    assert any(each.action == "act" for each in watched.of(ActionBegan))
     assert ("robot",) in looks
     assert any("robot" not in each for each in looks)
     assert ("mutual_facial_gaze", "robot", "succeeded") in events
