@@ -43,13 +43,14 @@ export function finder(detect, mesh, most) {
     found.push(face);
   }
 
-  // The last square with a sure face, each by the points that are found in the one before; null: none is sure.
+  // The square with the surest face, by the points that are found in one after the other; null: none is sure.
   function refined(picture, crop) {
     let best = null;
+    let surest = SURE;
     for (const first of [crop, { ...crop, angle: 0 }]) {
       for (let each = first, n = 0; n < REFINED; n += 1) {
         const { points, confidence } = meshed(picture, each);
-        if (confidence >= SURE) best = each;
+        if (confidence >= surest) [best, surest] = [each, confidence];
         each = around(points);
       }
       if (best) break;

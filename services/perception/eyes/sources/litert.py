@@ -101,18 +101,17 @@ class FaceFinder:
             found.append((points, confidence))
 
     def _refined(self, image: Image, crop: Crop) -> Crop | None:
-        """The last square with a sure face, each by the points that are found in the one before; None: none is sure.
+        """The square with the surest face, by the points that are found in one after the other; None: none is sure.
 
         The detector knows no more than the eyes, and of a head that is turned aside and down at once these lie askew.
-        Not the surest: all are sure alike, to the last digit, which no two machines have in common.
         """
-        best = None
+        best, surest = None, SURE
         for upright in (False, True):
             each = crop._replace(angle=0.0) if upright else crop
             for _ in range(REFINED):
                 points, confidence = self._meshed(image, each)
-                if confidence >= SURE:
-                    best = each
+                if confidence >= surest:
+                    best, surest = each, confidence
                 each = around(points)
             if best is not None:
                 break
