@@ -28,7 +28,8 @@ SHELLS = {
     "services/perception/eyes/people.py",  # publishes people and heads
     "services/perception/eyes/watching.py",  # runs the process of a source
     "services/perception/pictures.py",  # a camera, in the process of a source
-    "services/perception/hearing/company.py",  # publishes people and faults
+    "services/perception/sense_faults.py",  # publishes faults
+    "services/perception/hearing/company.py",  # publishes people
     "services/perception/hearing/device.py",  # waits for sound, and for a device that is gone
     "services/perception/hearing/intake.py",  # takes what others tell
     "services/perception/hearing/pages.py",  # takes the sound of pages

@@ -67,7 +67,7 @@ LAYERS = {
     " keyring",
     "services/control": "mujoco reachy_mini torso > figure service testing > bases calibrating serving voice"
     " > contract > config motion",
-    "services/perception": "testing > pieces > eyes hearing > attached child offered pictures",
+    "services/perception": "testing > pieces > eyes hearing > attached child offered pictures sense_faults",
     "services/perception/eyes": "service > pages > people seat > watching > sources > placing seeing"
     " > nodding tracking > camera head_pose one_euro > looking > config",
     "services/perception/pieces": "service > watching > keeping sources > finding > hands > spotting"

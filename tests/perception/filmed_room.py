@@ -121,7 +121,11 @@ class FilmedRoom:
         self._grain = np.rint(self._chance.normal(0, 3, shape)).astype(np.int16)
         self._own, self._way = OwnVoice(), way_through_a_room(*ECHOES, self._chance)
         self._hiss = pink(60 * RATE) * 10
-        self.is_over = False
+
+    @property
+    def said(self) -> list[tuple[Seconds, str]]:
+        """What the person has said, and when."""
+        return self._human.said
 
     async def live(self, bus: Bus, ready: Ready) -> None:
         """Let the person come when the robot is there, and do what they do. Nothing of it is told."""
@@ -152,12 +156,19 @@ class FilmedRoom:
 
     def faces(self, now: Seconds) -> Picture:
         """What the robot's eyes see of people."""
-        pose = self._pose(now) if self._table.seated else None
-        if pose not in self._drawn:
+        if (pose := self.pose(now)) not in self._drawn:
             people = [] if pose is None else [(self._model, pose)]
             self._drawn[pose] = drawn_people(people, Light(), CAMERA, seed=1)
+        return self.grained(self._drawn[pose])
+
+    def grained(self, picture: Picture) -> Picture:
+        """A picture with the noise of a camera."""
         grain = self._grain[int(self._chance.integers(GRAINS))]
-        return np.clip(grain + self._drawn[pose], 0, 255).astype(np.uint8)
+        return np.clip(grain + picture, 0, 255).astype(np.uint8)
+
+    def pose(self, now: Seconds) -> Pose | None:
+        """The head now; None: nobody is there."""
+        return self._pose(now) if self._table.seated else None
 
     def _pose(self, now: Seconds) -> Pose:
         """The head now, on its way, or where it has come to: in steps, so that not each picture has to be drawn."""

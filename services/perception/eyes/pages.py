@@ -5,19 +5,17 @@ The page tells points, and never a picture. Who sits there is in the world alrea
 
 from collections.abc import Awaitable, Callable
 
-from msgspec.structs import replace
-
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.perception import FaceLandmarks
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import Bus, Subscription
 from engage_hri.services.client.people.perceived_person import SEAT
 from engage_hri.services.perception.eyes.config import EyesConfig
 from engage_hri.services.perception.eyes.people import SeenPeople
 from engage_hri.services.perception.eyes.seat import SeatSeeing
 from engage_hri.services.perception.eyes.watching import SILENT
+from engage_hri.services.perception.sense_faults import SenseFaults
 
 MOST_PAGES = 16
 """Cameras of pages that are followed at once: each costs 1 % of a processor."""
@@ -38,6 +36,7 @@ class PageEyes:
     def __init__(self, bus: Bus, config: EyesConfig, inbox: Subscription, people: SeenPeople) -> None:
         self._bus, self._config, self._inbox, self._people = bus, config, inbox, people
         self._pages: dict[str, _PageCamera] = {}
+        self._faults = SenseFaults(bus)
 
     async def watch(self, begin: Callable[[], Awaitable[None]]) -> None:
         """See with them for ever. One that tells nothing any more is a fault, and ends."""
@@ -89,8 +88,7 @@ class PageEyes:
             reason = f"no picture is looked at any more by the camera of {person}"
             advice = "is it covered, or the page, or the computer it is on, asleep or cut off?"
             fault = Fault(reason=reason, where=keys.landmarks(person), advice=advice)
-            journal.alert(self._bus.log, "%s", fault)
-            self._bus.publish(keys.fault(self._bus.name), replace(fault, service=self._bus.name))
+            self._faults.tell(fault)
 
     def _end(self, person: str) -> None:
         """See no more with a camera. Who was away before it is where their seat is: nobody knows better now."""

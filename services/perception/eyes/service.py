@@ -11,11 +11,9 @@ from contextlib import aclosing
 from msgspec.structs import replace
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.participants import PeerAlive
 from engage_hri.schemas.perception import FaceLandmarks
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import Bus, Subscription
 from engage_hri.services.perception.eyes.config import PAGE, EyesConfig
 from engage_hri.services.perception.eyes.looking import settings_of
@@ -29,6 +27,7 @@ from engage_hri.services.perception.eyes.watching import (
     SourceOrder,
     Watching,
 )
+from engage_hri.services.perception.sense_faults import SenseFaults
 from engage_hri.services.runtime.parcels import data_folder
 from engage_hri.services.runtime.service import Ready, tell_settings
 
@@ -75,8 +74,7 @@ class _Eyes:
         is_real = abs(bus.now() - time.monotonic()) < 1.0
         self._watching: Watching = OutsideWatching(order) if is_real else InsideWatching(order)
         self._seeing = Seeing(config)
-        self._is_lost = False
-        """No picture comes from the device, which was told."""
+        self._faults = SenseFaults(bus)
 
     async def watch(self, begin: Callable[[], Awaitable[None]]) -> None:
         """See all that the source tells; what a device does not give is told, and it is tried again.
@@ -94,7 +92,7 @@ class _Eyes:
                             self._see(landmarks)
                 return
             except SourceLost as lost:
-                self._lose(lost.fault)
+                self._faults.lose(lost.fault)
             await begin()
             until = self._bus.now() + AGAIN
             while (received := await self._inbox.next(until)) is not None:
@@ -105,18 +103,10 @@ class _Eyes:
         self._people.tell(self._seeing.end(), self._bus.now())
 
     def _see(self, landmarks: FaceLandmarks) -> None:
-        if self._is_lost:
-            self._is_lost = False
-            journal.alert(self._bus.log, "seeing again")
+        self._faults.get()
         at = landmarks.at.seconds
         self._bus.publish(keys.landmarks(self._bus.name), replace(landmarks, at=self._bus.stamp(at)))
         self._people.looked(self._bus.name, self._seeing.feed(landmarks, at), self._seeing.missed, at)
-
-    def _lose(self, fault: Fault) -> None:
-        if not self._is_lost:
-            self._is_lost = True
-            journal.alert(self._bus.log, "%s", fault)
-            self._bus.publish(keys.fault(self._bus.name), replace(fault, service=self._bus.name))
 
 
 async def _recognition(bus: Bus, inbox: Subscription, people: SeenPeople) -> None:

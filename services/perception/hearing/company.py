@@ -1,15 +1,9 @@
-"""People whom hearing knows, and faults that it tells."""
-
-from collections import deque
-
-from msgspec.structs import replace
+"""People whom hearing knows."""
 
 from engage_hri.schemas import keys
-from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.perception import ActorFound, ActorLost
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.client.people.perceived_person import PerceivedActions, free_seat
 from engage_hri.services.client.people.shared_world import SharedWorld
@@ -56,23 +50,3 @@ class HeardPeople:
 
     def _show(self, now: Seconds) -> None:
         self._bus.publish(keys.WORLD, World(entities=self._world.tell(self._own.values(), now), at=self._bus.stamp()))
-
-
-class HearingFaults:
-    """Tells faults of sound and people, which are no bugs of ours."""
-
-    def __init__(self, bus: Bus) -> None:
-        self._bus = bus
-        self._told: deque[str] = deque(maxlen=16)
-        """Reasons of those that are told once, the last ones."""
-
-    def tell(self, fault: Fault) -> None:
-        """Tell a fault."""
-        journal.alert(self._bus.log, "%s", fault)
-        self._bus.publish(keys.fault(self._bus.name), replace(fault, service=self._bus.name))
-
-    def tell_once(self, fault: Fault) -> None:
-        """Tell a fault, if it has not been told lately."""
-        if fault.reason not in self._told:
-            self._told.append(fault.reason)
-            self.tell(fault)

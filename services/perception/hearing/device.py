@@ -5,16 +5,14 @@ from contextlib import aclosing
 
 import numpy as np
 
-from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.units import Seconds
-from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.perception.hearing.company import HearingFaults
 from engage_hri.services.perception.hearing.config import HearingConfig
 from engage_hri.services.perception.hearing.intake import HearingIntake
 from engage_hri.services.perception.hearing.microphone import SoundLost, opened
 from engage_hri.services.perception.hearing.sound import Piece
 from engage_hri.services.perception.hearing.speeches import Speeches
+from engage_hri.services.perception.sense_faults import SenseFaults
 
 AGAIN: Seconds = 2.0
 """Time after which a device is tried again that gave no sound."""
@@ -23,14 +21,12 @@ AGAIN: Seconds = 2.0
 class DeviceEars:
     """Hears the source of the settings."""
 
-    def __init__(self, bus: Bus, config: HearingConfig, speeches: Speeches, faults: HearingFaults) -> None:
+    def __init__(self, bus: Bus, config: HearingConfig, speeches: Speeches, faults: SenseFaults) -> None:
         """Raises InputRefused: there is no such source."""
         self._bus, self._speeches, self._faults = bus, speeches, faults
         people = config.people or ("",)
         self._sound = opened(config.source, len(people))
         self._channels = [speeches.channel(person) for person in people]
-        self._is_lost = False
-        """No sound comes, which was told."""
 
     async def listen(self, intake: HearingIntake) -> None:
         """Hear all that the source gives; what a device does not give is told, and it is tried again."""
@@ -40,14 +36,13 @@ class DeviceEars:
                     await self._hear(sound, intake)
                 return
             except SoundLost as lost:
-                self._lose(lost.fault)
+                self.close()
+                self._faults.lose(lost.fault)
             await intake.wait_until(self._bus.now() + AGAIN)
 
     async def _hear(self, sound: AsyncGenerator[Piece, None], intake: HearingIntake) -> None:
         async for piece in sound:
-            if self._is_lost:
-                self._is_lost = False
-                journal.alert(self._bus.log, "hearing again")
+            self._faults.get()
             intake.catch_up()
             for number, channel in enumerate(self._channels):
                 self._speeches.feed(channel, np.ascontiguousarray(piece.samples[:, number]), piece.at)
@@ -58,9 +53,3 @@ class DeviceEars:
         """End what is being said."""
         for channel in self._channels:
             self._speeches.lose(channel)
-
-    def _lose(self, fault: Fault) -> None:
-        self.close()
-        if not self._is_lost:
-            self._is_lost = True
-            self._faults.tell(fault)

@@ -7,11 +7,12 @@ from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.perception import SoundFrame
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.perception.hearing.company import HeardPeople, HearingFaults
+from engage_hri.services.perception.hearing.company import HeardPeople
 from engage_hri.services.perception.hearing.intake import HearingIntake
 from engage_hri.services.perception.hearing.microphone import SILENT
 from engage_hri.services.perception.hearing.speeches import SoundChannel, Speeches
 from engage_hri.services.perception.hearing.voice import RATE
+from engage_hri.services.perception.sense_faults import SenseFaults
 
 MOST_PAGES = 16
 """Microphones of pages that are heard at once: a detector needs 10 MB, and 0.7 % of a processor."""
@@ -29,7 +30,7 @@ class _PageMicrophone:
 class PageEars:
     """Hears all microphones of pages that are on, each that of a person."""
 
-    def __init__(self, bus: Bus, speeches: Speeches, people: HeardPeople, faults: HearingFaults) -> None:
+    def __init__(self, bus: Bus, speeches: Speeches, people: HeardPeople, faults: SenseFaults) -> None:
         self._bus, self._speeches, self._people, self._faults = bus, speeches, people, faults
         self._pages: dict[str, _PageMicrophone] = {}
 

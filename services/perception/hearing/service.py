@@ -2,12 +2,13 @@
 
 from engage_hri.schemas import keys
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.perception.hearing.company import HeardPeople, HearingFaults
+from engage_hri.services.perception.hearing.company import HeardPeople
 from engage_hri.services.perception.hearing.config import PAGE, HearingConfig
 from engage_hri.services.perception.hearing.device import DeviceEars
 from engage_hri.services.perception.hearing.intake import HearingIntake
 from engage_hri.services.perception.hearing.pages import PageEars
 from engage_hri.services.perception.hearing.speeches import Speeches, is_cancelling
+from engage_hri.services.perception.sense_faults import SenseFaults
 from engage_hri.services.runtime.service import Ready, tell_settings
 
 
@@ -23,7 +24,7 @@ async def hear(bus: Bus, ready: Ready, config: HearingConfig) -> None:
     own = (keys.ROBOT_SOUND,) if is_cancelling(config) else ()
     patterns = keys.ANY_ROBOT_ALIVE, keys.WORLD, keys.ROBOT_ACTION, *more, *own
     tell_settings(bus, "hearing", config)
-    people, faults = HeardPeople(bus), HearingFaults(bus)
+    people, faults = HeardPeople(bus), SenseFaults(bus, "hearing again")
     speeches = Speeches(bus, config, people, faults)
     ears = PageEars(bus, speeches, people, faults) if has_pages else DeviceEars(bus, config, speeches, faults)
     intake = HearingIntake(bus, patterns, people, speeches)

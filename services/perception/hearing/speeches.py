@@ -30,7 +30,7 @@ from engage_hri.schemas.perception import (
 )
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.interface import Bus
-from engage_hri.services.perception.hearing.company import HeardPeople, HearingFaults
+from engage_hri.services.perception.hearing.company import HeardPeople
 from engage_hri.services.perception.hearing.config import HearingConfig
 from engage_hri.services.perception.hearing.lips import Lips
 from engage_hri.services.perception.hearing.listening import (
@@ -61,6 +61,7 @@ from engage_hri.services.perception.hearing.voice import (
     VoiceSound,
     silero,
 )
+from engage_hri.services.perception.sense_faults import SenseFaults
 from engage_hri.services.runtime.installation import extra_command
 from engage_hri.services.runtime.parcels import data_folder
 
@@ -118,7 +119,7 @@ class SoundChannel:
 class Speeches:
     """Speeches of all channels. recognizer: None: nobody understands words. detector: None: nobody judges ends."""
 
-    def __init__(self, bus: Bus, config: HearingConfig, people: HeardPeople, faults: HearingFaults) -> None:
+    def __init__(self, bus: Bus, config: HearingConfig, people: HeardPeople, faults: SenseFaults) -> None:
         """Raises InputRefused: there is no such recognizer, or a package is not installed."""
         self._bus, self._config, self._people, self._faults = bus, config, people, faults
         try:

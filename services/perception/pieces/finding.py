@@ -74,8 +74,11 @@ BARE = 0.06
 LEAST, SAME = 1.0, 1.3
 """Score of what is a piece at all; and of one that is where it was, so that it is not looked for. At most it is 2."""
 RIVAL = 0.2
-"""Difference of scores up to which all pixels around decide: a trapezoid is nearly a triangle, and its walls can make
-up for its missing corner."""
+"""Difference of scores up to which all pixels around decide: a trapezoid is nearly a triangle, and the foot of a wall
+looks like the edge of a top."""
+LEAST_AGREED, CLOSE = 0.4, 0.05
+"""Share of the colors around that a piece explains at least; and difference of it up to which it is not known which
+of two places is that of the piece."""
 AGAIN = 10
 """Pictures after which a piece is looked for everywhere, whatever its score."""
 PLACE_KNOWN: Meters = 0.003
@@ -84,7 +87,7 @@ TURN_KNOWN: Radians = math.radians(3.0)
 
 
 class _Laid(NamedTuple):
-    """A form at a place. score: how well it explains the colors there."""
+    """A form at a place. score: how well it explains the colors there. hidden: share of it of which none is known."""
 
     pose: Floats
     score: float
@@ -92,6 +95,7 @@ class _Laid(NamedTuple):
     support: float = 0.0
     spread: float = math.inf
     turn_spread: float = math.inf
+    hidden: float = 0.0
 
 
 class FoundOnTable(NamedTuple):
@@ -224,6 +228,11 @@ class _Shape:
         self.inside = lattice[depth < -0.0025]
         self.beyond, self.beyond_normals = self.points + 0.004 * self.normals, self.normals
 
+    def is_same(self, pose: Floats, other: Floats) -> bool:
+        """Tell whether two poses are one, as far as it is known where a piece lies."""
+        turn = math.remainder(pose[2] - other[2], math.tau / self.form.turns_alike)
+        return math.dist(pose[:2], other[:2]) <= 2 * PLACE_KNOWN and abs(turn) <= 2 * TURN_KNOWN
+
 
 def _turning(angle: float) -> Floats:
     c, s = math.cos(angle), math.sin(angle)
@@ -285,7 +294,8 @@ class PieceFinder:
         """Find the pieces of one color: the one that explains most first; what it explains is no other's."""
         value = np.where(labels == number, 1.0, np.where(labels == UNKNOWN, 0.0, -1.0)).astype(np.float32)
         tops = self._tops(tone, value)
-        seen, found = _Seen(flat, value, tops, covered), []
+        found, left = list[tuple[SpottedPiece, _Shape, Floats]](), value.copy()
+        seen = _Seen(flat, value, tops, covered)
         looks_everywhere = (self._count + number) % AGAIN == 0
         waiting = {shape.form.id: shape for shape in shapes}
         best = {id: self._where_it_was(seen, shape) for id, shape in waiting.items()}
@@ -298,12 +308,12 @@ class PieceFinder:
             if laid.score <= LEAST:
                 break
             x, y, yaw = laid.pose.tolist()
-            found.append(SpottedPiece(id, x, y, yaw, laid.seen, laid.spread, laid.turn_spread))
-            self._fill(value, shape, laid.pose, -1.0)  # what it explains is no other's
-            seen = seen._replace(tops=np.minimum(tops, value))
+            found.append((SpottedPiece(id, x, y, yaw, laid.seen, laid.spread, laid.turn_spread), shape, laid.pose))
+            self._fill(left, shape, laid.pose, -1.0)  # what it explains is no other's
+            seen = seen._replace(value=left, tops=np.minimum(tops, left))
             best = {each: self._judged(seen, shape, best[each]) for each, shape in waiting.items()}
             looks_everywhere = False
-        return found
+        return [each for each, shape, pose in found if self._agreement(value, left, shape, pose) > LEAST_AGREED]
 
     # -- where a form may lie ---------------------------------------------------------------------------------------
 
@@ -319,21 +329,38 @@ class PieceFinder:
             *(self._moved(seen, shape, each) for each in self._likely(seen.tops, shape)),
         ]
         best = max(tried, key=lambda laid: laid.score)
+        if best.score <= 0:
+            return best
         # One edge of a top and the foot of another wall may agree on a place beside the right one.
-        tried += [self._moved(seen, shape, best.pose + beside) for beside in BESIDE if best.score > 0]
-        most = max(laid.score for laid in tried)
-        rivals = [laid for laid in tried if laid.score > max(0.0, most - RIVAL)]
-        return max(rivals, key=lambda laid: self._agreement(seen, shape, laid.pose), default=best)
+        wall = np.array([*(best.pose[:2] - self._sunk(best.pose[:2])), 0.0])
+        tried += [self._moved(seen, shape, best.pose + step) for step in (*BESIDE, wall, -wall)]
+        least = max(laid.score for laid in tried) - RIVAL
+        agreed = [
+            (self._agreement(seen.value, seen.value, shape, laid.pose), laid)
+            for laid in tried
+            if laid.score > max(0.0, least - laid.hidden)  # what is hidden might have its color
+        ]
+        most, best = max(agreed, key=lambda each: each[0])
+        as_well = (laid for agreement, laid in agreed if agreement > most - CLOSE)
+        is_sure = all(shape.is_same(laid.pose, best.pose) for laid in as_well)
+        return best if is_sure else best._replace(score=0.0)
 
-    def _agreement(self, seen: _Seen, shape: _Shape, pose: Floats) -> float:
-        """Judge how well a form there explains all tops around: what it covers less what it leaves, as a share."""
-        top = self._flat.at(shape.outline @ _turning(pose[2]) + pose[:2])[:, ::-1]
-        low = np.floor(top.min(0) - MARGIN / STEP).astype(int).clip(0)
-        high = np.ceil(top.max(0) + MARGIN / STEP).astype(int)
-        value = seen.tops[low[1] : high[1], low[0] : high[0]]
-        covers = np.zeros(value.shape, np.uint8)
-        cv2.fillConvexPoly(covers, np.rint(top - low - 0.5).astype(np.int32), 1)
-        return float((value * covers).sum() - ((value > 0.5) & (covers == 0)).sum()) / max(int(covers.sum()), 1)
+    def _agreement(self, value: Any, left: Any, shape: _Shape, pose: Floats) -> float:
+        """Judge how well a form there explains all colors around, by its top and its walls: share of what is known
+        that it explains, less what it does not. The color of a wall in its shade may be that of another piece.
+
+        left: value, less what other pieces explain.
+        """
+        outline, top = self._silhouette(shape, pose), self._flat.at(shape.outline @ _turning(pose[2]) + pose[:2])
+        low = np.floor(outline.min(0) - MARGIN / STEP).astype(int).clip(0)
+        high = np.ceil(outline.max(0) + MARGIN / STEP).astype(int)
+        value, left = (each[low[1] : high[1], low[0] : high[0]] for each in (value, left))
+        covers, is_top = np.zeros(value.shape, np.uint8), np.zeros(value.shape, np.uint8)
+        for mask, points in ((covers, outline), (is_top, top[:, ::-1])):
+            cv2.fillConvexPoly(mask, np.rint(points - low - 0.5).astype(np.int32), 1)
+        own = int(((value > 0) & (covers > 0)).sum())
+        against = int(((value < 0) & (is_top > 0)).sum() + ((left > 0) & (covers == 0)).sum())
+        return (own - against) / max(own + against, 1)
 
     def _tops(self, tone: Any, value: Any) -> Any:
         """Values in which walls count less than tops: most of what is seen of a piece is its top, and walls are
@@ -508,13 +535,18 @@ class PieceFinder:
         is_there = own >= LEAST_SEEN and foreign <= MOST_FOREIGN and beyond <= MOST_BEYOND
         is_known = laid.spread <= PLACE_KNOWN and laid.turn_spread <= TURN_KNOWN
         score = float((top > 0.5).mean()) + laid.support - foreign - beyond
-        return laid._replace(score=score if is_there and is_known else 0.0, seen=own)
+        hidden = 1 - own - foreign
+        return laid._replace(score=score if is_there and is_known else 0.0, seen=own, hidden=hidden)
 
     def _fill(self, value: Any, shape: _Shape, pose: Floats, filling: float) -> None:
         """Fill what a piece explains, its top and its walls."""
-        top = shape.outline * 1.03 @ _turning(pose[2]) + pose[:2]
+        cv2.fillConvexPoly(value, np.rint(self._silhouette(shape, pose, 1.03)).astype(np.int32), filling)
+
+    def _silhouette(self, shape: _Shape, pose: Floats, scale: float = 1.0) -> Floats:
+        """Outline in which a piece is seen, its top and its walls: columns and rows."""
+        top = shape.outline * scale @ _turning(pose[2]) + pose[:2]
         outline = cv2.convexHull(self._flat.at(np.concatenate([top, self._sunk(top)])).astype(np.float32))
-        cv2.fillConvexPoly(value, np.rint(outline[:, 0, ::-1]).astype(np.int32), filling)
+        return np.asarray(outline[:, 0, ::-1], float)
 
 
 def learned(image: Image, table: TaskTable, flat: FlatTable) -> Palette:

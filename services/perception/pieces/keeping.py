@@ -144,7 +144,7 @@ def _named(hands: Iterable[Entity]) -> Iterator[Entity]:
 def _turned_alike(kept: _Kept, piece: SpottedPiece) -> SpottedPiece:
     """The piece with the turn, of those that look the same, that is nearest to how it was told."""
     about = kept.pose.yaw if kept.pose is not None else math.radians(kept.form.start.yaw)
-    return _with(piece, yaw=about + math.remainder(piece.yaw - about, math.tau / kept.form.turns_alike))
+    return replace(piece, yaw=about + math.remainder(piece.yaw - about, math.tau / kept.form.turns_alike))
 
 
 def _see(kept: _Kept, piece: SpottedPiece, at: Seconds, hands: Iterable[SpottedHand]) -> None:
@@ -199,19 +199,15 @@ def _is_elsewhere(piece: SpottedPiece, told: SpottedPiece) -> bool:
 
 def _settled(told: SpottedPiece, seen: list[SpottedPiece], share: Probability) -> SpottedPiece:
     """The pose that is told on: the median of what was seen, if that is beside it by more than a nudge."""
-    told = _with(told, seen=share)
+    told = replace(told, seen=share)
     if len(seen) < FEWEST:
         return told
     x, y, yaw = (median(getattr(each, name) for each in seen) for name in ("x", "y", "yaw"))
     if math.dist((x, y), (told.x, told.y)) <= NUDGE and abs(yaw - told.yaw) <= TWIST:
         return told
-    return _with(told, x=x, y=y, yaw=yaw)
+    return replace(told, x=x, y=y, yaw=yaw)
 
 
 def _confidence(seen: Probability) -> Probability:
     """Confidence in a piece that is seen, in tenths: its place is known, or it would not be told as seen."""
     return round(0.6 + 0.4 * seen, 1)
-
-
-def _with(piece: SpottedPiece, **changes: float) -> SpottedPiece:
-    return replace(piece, **changes)

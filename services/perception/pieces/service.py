@@ -8,14 +8,10 @@ import asyncio
 import time
 from contextlib import aclosing
 
-from msgspec.structs import replace
-
 from engage_hri.schemas import keys
-from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.tables import Relation, TaskTable, relations
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.bus import journal
 from engage_hri.services.bus.interface import Bus, Received, Subscription
 from engage_hri.services.client.people.shared_world import SharedWorld
 from engage_hri.services.perception.eyes.watching import InsideWatching, OutsideWatching, SourceLost, SourceOrder
@@ -24,6 +20,7 @@ from engage_hri.services.perception.pieces.config import PiecesConfig
 from engage_hri.services.perception.pieces.keeping import COVERED, HandKeeper, PieceKeeper
 from engage_hri.services.perception.pieces.spotting import SpottedPieces, table_settings
 from engage_hri.services.perception.pieces.watching import TABLES_SEEN
+from engage_hri.services.perception.sense_faults import SenseFaults
 from engage_hri.services.runtime.service import Ready, tell_settings
 
 AGAIN: Seconds = 2.0
@@ -55,7 +52,7 @@ async def keep_an_eye(bus: Bus, ready: Ready, config: PiecesConfig) -> None:
                                 looking.see(spotted)
                     return
                 except SourceLost as lost:
-                    looking.lose(lost.fault)
+                    looking.faults.lose(lost.fault)  # all stays where it was seen last
                 if not is_ready:
                     is_ready = True
                     ready()
@@ -74,14 +71,11 @@ class _Looking:
         self._top = Entity(id=top.id, kind="surface", position=top.center, footprint=top.footprint)
         self._own: tuple[Entity, ...] = ()
         self._touching: frozenset[Relation] = frozenset()
-        self._is_lost = False
-        """No picture comes from the device, which was told."""
+        self.faults = SenseFaults(bus)
 
     def see(self, spotted: SpottedPieces) -> None:
         """Take what is seen in a picture."""
-        if self._is_lost:
-            self._is_lost = False
-            journal.alert(self._bus.log, "seeing again")
+        self.faults.get()
         is_due = False
         while (received := self._inbox.take()) is not None:
             is_due |= self._take(received)
@@ -92,13 +86,6 @@ class _Looking:
             self._own = own
             self._show(spotted.at.seconds)
         self._tell_touching(pieces)
-
-    def lose(self, fault: Fault) -> None:
-        """Tell that nothing is seen any more. All stays where it was seen last."""
-        if not self._is_lost:
-            self._is_lost = True
-            journal.alert(self._bus.log, "%s", fault)
-            self._bus.publish(keys.fault(self._bus.name), replace(fault, service=self._bus.name))
 
     def close(self) -> None:
         """Take away what was told."""

@@ -23,11 +23,19 @@ def written(path: Path, pictures: Iterable[Picture]) -> Path:
     """Write a film. Its pictures are of one size, of which both sides are even."""
     with path.open("wb") as file:
         for number, picture in enumerate(pictures):
-            if number == 0:
-                height, width = picture.shape[:2]
-                file.write(f"YUV4MPEG2 W{width} H{height} F{RATE}:1 Ip A1:1 C420jpeg\n".encode())
-            file.write(b"FRAME\n" + cv2.cvtColor(picture, cv2.COLOR_RGB2YUV_I420).tobytes())
+            file.write((b"" if number else head_of(picture)) + frame(picture))
     return path
+
+
+def head_of(picture: Picture) -> bytes:
+    """What a film of such pictures begins with."""
+    height, width = picture.shape[:2]
+    return f"YUV4MPEG2 W{width} H{height} F{RATE}:1 Ip A1:1 C420jpeg\n".encode()
+
+
+def frame(picture: Picture) -> bytes:
+    """A picture as it stands in a film: all of a size are of one length."""
+    return b"FRAME\n" + cv2.cvtColor(picture, cv2.COLOR_RGB2YUV_I420).tobytes()
 
 
 def read(path: Path) -> Iterator[Picture]:

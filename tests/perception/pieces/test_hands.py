@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+import numpy as np
 import pytest
 
 from engage_hri.schemas.units import Stamp
@@ -11,8 +12,8 @@ from engage_hri.services.perception.pieces.keeping import HandKeeper, PieceKeepe
 from engage_hri.services.perception.pieces.spotting import SpottedHand, SpottedPiece, SpottedPieces
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.perceive.manipulation import Manipulation
-from tests.perception.pieces.tables import SKINS, STARTS, TABLE, Hand, Light, Pose, drawn
-from tests.perception.pieces.test_finding import finder
+from tests.perception.pieces.tables import SKINS, STARTS, TABLE, Hand, Light, Pose, drawn, layout
+from tests.perception.pieces.test_finding import beside, finder
 
 AHEAD = Hand((0.62, 0.12))
 MIDDLE = 0.04
@@ -123,6 +124,24 @@ def test_what_a_hand_holds_is_found_and_is_not_the_hand(skin: int):
     assert math.dist((held.x, held.y), (x, y)) < 0.003
     [found] = seen.hands
     assert math.dist((found.x, found.y), (hand.at[0] - MIDDLE, y)) < 0.06
+
+
+@pytest.mark.parametrize("number", [3, 13])
+def test_a_piece_under_a_hand_is_told_where_it_lies_or_not_at_all(number: int):
+    """The foot of a wall looks like the edge of a top, and half a square is a triangle: both were told as sure."""
+    chance = np.random.default_rng([99, number])
+    truth = layout(chance)
+    laid = [*truth][int(chance.integers(len(truth)))]
+    skin, light = int(chance.integers(4)), Light(chance.choice([0.6, 1.0, 1.0, 1.3]), chance.choice([4.0, 8.0, 15.0]))
+    x, y, _ = truth[laid]
+    at = (x + chance.uniform(0.075, 0.11), y + chance.normal(0, 0.01))
+    hand = Hand(at, chance.normal(0, 0.25), skin, chance.uniform(0.012, 0.04))
+    looks, before = finder(), {id: pose for id, pose in truth.items() if id != laid}
+    looks.find(drawn(before, light=light, seed=number))
+    pieces = looks.find(drawn(truth, light=light, hands=[hand], seed=number, take=1)).pieces
+
+    assert len(pieces) > 3
+    assert beside({piece.id: piece for piece in pieces}, truth) < 5
 
 
 def test_a_pale_hand_that_stays_does_not_become_the_table():
