@@ -105,6 +105,7 @@ class HeardLog:
                 remembered[id] = {*list(last)[-REMEMBERED:]}
             match each:
                 case ConnectionEvent(initiator=initiator, responder=responder, answered_by=by):
+                    last.pop(each.id, None)  # the latest are those that were told last
                     named, last[each.id] = {initiator, responder, by}, each
                 case Interjection(actor=actor):
                     named = {actor}

@@ -293,8 +293,10 @@ class SessionScene:
 
     def robot_says(self, since: Seconds, at: Seconds) -> bool:
         """True if what the robot says at `at` goes on since then."""
-        said = [each for each in self.spoken if each.actor == self.robot and each.since <= since]
-        return any(each.until is None or at < each.until for each in said)
+        return any(
+            each.actor == self.robot and each.since <= since and (each.until is None or at < each.until)
+            for each in self.spoken
+        )
 
     def forget_spoken(self, spoken: Spoken) -> None:
         """Forget a speech that was another one's: two have told of it."""

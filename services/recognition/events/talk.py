@@ -38,7 +38,7 @@ Step = Callable[[Dialogue], object]
 
 
 class Ending(NamedTuple):
-    """What ends a question of the robot, unless somebody has answered before. is_cut_off: the end of its turn does."""
+    """What ends a question of the robot, unless somebody has answered it before. is_cut_off: its turn is cut off."""
 
     step: Step
     is_cut_off: bool = False
