@@ -37,8 +37,8 @@ from engage_hri.services.text.listening import is_listening, says_words
 Step = Callable[[Dialogue], object]
 
 
-class Ending(NamedTuple):
-    """What ends a question of the robot, unless somebody has answered it before. is_cut_off: its turn is cut off."""
+class QuestionEnd(NamedTuple):
+    """End of a question of the robot, unless somebody has answered it before. is_cut_off: its turn is cut off."""
 
     step: Step
     is_cut_off: bool = False
@@ -50,7 +50,7 @@ class Talk(KindRecognizer):
     def __init__(self, id: str, scene: SessionScene, config: RecognitionConfig, writer: EventWriter) -> None:
         super().__init__(id, scene, config, writer)
         self._conversation = Dialogue(id, scene, config, writer)
-        self._line: deque[tuple[Seconds, Step | OwnSpeech | Ending]] = deque()
+        self._line: deque[tuple[Seconds, Step | OwnSpeech | QuestionEnd]] = deque()
         """What is not told yet, with its times. The first is a speech of which it is not known to whom it is."""
         self._asked_in_line: Seconds = inf
         """Start of the first turn of the robot that is in line; infinite: none is."""
@@ -386,7 +386,7 @@ class Talk(KindRecognizer):
 
     def abort(self, at: Seconds, *, turn: str) -> None:
         # Who has interrupted the turn has done so before that, also if it is known only now, and told of `at`.
-        cut_off, since = Ending(lambda talk: talk.abort(at, turn=turn), is_cut_off=True), nextafter(at, inf)
+        cut_off, since = QuestionEnd(lambda talk: talk.abort(at, turn=turn), is_cut_off=True), nextafter(at, inf)
         if self._line or (self.asked_since < inf and self._scene.is_contested(self.id, since)):
             self._line.append((since, cut_off))
         else:
@@ -398,7 +398,7 @@ class Talk(KindRecognizer):
     def _take_in_order(self, at: Seconds, step: Step) -> None:
         """Take what ends a question of the robot, after what somebody else may have answered before."""
         if self._line or (self.asked_since < inf and self._waits_for_others(at)):
-            self._line.append((at, Ending(step)))
+            self._line.append((at, QuestionEnd(step)))
         else:
             step(self._conversation)
 
@@ -412,11 +412,11 @@ class Talk(KindRecognizer):
         for each in self._writer.answered:
             if each.began <= at and not self.may_answer_before(each):
                 return True  # it is to be told first that this has answered for all
-        if since is None or (isinstance(first, Ending) and first.is_cut_off):
+        if since is None or (isinstance(first, QuestionEnd) and first.is_cut_off):
             return since is not None and self._scene.is_contested(self.id, since)
         # Else it says nothing, and ends no question.
         may_matter = isinstance(first, OwnSpeech) or (
-            isinstance(first, Ending) and self._conversation.exchange.pair.may_be_answered
+            isinstance(first, QuestionEnd) and self._conversation.exchange.pair.may_be_answered
         )
         return may_matter and self._waits_for_others(since)
 
@@ -515,7 +515,7 @@ class Talk(KindRecognizer):
             if isinstance(item, OwnSpeech):
                 self._tell(item)
             else:
-                (item.step if isinstance(item, Ending) else item)(self._conversation)
+                (item.step if isinstance(item, QuestionEnd) else item)(self._conversation)
         if not self._line:
             self._asked_in_line = inf
 
