@@ -10,7 +10,6 @@ from engage_hri.schemas.body import NoPointZone, Ray
 from engage_hri.schemas.world import Entity
 from engage_hri.services.generation.references.pairs import (
     angle_off_axis,
-    extent,
     in_zone,
     laid_out,
 )
@@ -88,8 +87,8 @@ def test_the_cylinder_begins_at_the_hand_and_grows_by_the_object() -> None:
 
 
 def test_without_a_radius_the_footprint_tells_how_large_an_object_is() -> None:
-    assert extent(thing("o", 0.0, 0.0, footprint=((0.03, 0.04), (-0.01, 0.0)))) == pytest.approx(0.05)
-    assert extent(thing("o", 0.0, 0.0, footprint=((0.03, 0.04),), radius=0.2)) == 0.2
+    assert thing("o", 0.0, 0.0, footprint=((0.03, 0.04), (-0.01, 0.0))).extent == pytest.approx(0.05)
+    assert thing("o", 0.0, 0.0, footprint=((0.03, 0.04),), radius=0.2).extent == 0.2
 
 
 def test_no_objects_no_distractors() -> None:

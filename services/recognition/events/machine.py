@@ -162,6 +162,8 @@ class EventWriter:
         """Words of speeches."""
         self._interjected: Latest[SpeechStart, Interjection] = Latest(INTERJECTIONS_KEPT)
         """What people have said into the robot's turns, as it was last told."""
+        self._formerly: Latest[SpeechStart, Interjection] = Latest(INTERJECTIONS_KEPT)
+        """What a former life told of speeches of which this one has not found yet that they are into its turns."""
         self._spoken: Latest[str, tuple[OngoingEvent, ConnectionEvent]] = Latest(TEXTS_KEPT)
         """Events with speech of a person, each as it was last told."""
         self.answered: list[Answered] = []
@@ -222,19 +224,21 @@ class EventWriter:
 
     def interject(self, person: str, speech: Seconds, reading: InterjectionReading, at: Seconds) -> None:
         """Tell what somebody says into the robot's turn; that it begins, once. speech: its start."""
-        words, stamp = self.text_of(person, speech), self.stamp
-        before = self._interjected.get(SpeechStart(person, speech))
+        words, stamp, key = self.text_of(person, speech), self.stamp, SpeechStart(person, speech)
+        if (former := self._formerly.pop(key, None)) is not None:
+            self._interjected[key] = former
+        before = self._interjected.get(key)
         if before is not None and (reading == "open" or (before.reading, before.words) == (reading, words)):
             return
         told = Interjection(
             actor=person, since=stamp(speech), at=stamp(max(at, self.now)), reading=reading, words=words
         )
-        self._interjected[SpeechStart(person, speech)] = told
+        self._interjected[key] = told
         self.effects.append(told)
 
     def remember(self, told: Interjection) -> None:
-        """Take this as told."""
-        self._interjected[SpeechStart(told.actor, told.since.seconds)] = told
+        """Take this as told by a former life. It decides nothing: that life knew of more words of the robot."""
+        self._formerly[SpeechStart(told.actor, told.since.seconds)] = told
 
     def decide_interjection(self, person: str, speech: Seconds, reading: InterjectionReading, at: Seconds) -> None:
         """Tell what it is that somebody says into the robot's turn, if that it began has been told, and no more."""
@@ -293,7 +297,7 @@ class EventWriter:
         def named(speech: SpeechStart) -> SpeechStart:
             return SpeechStart(kept, speech.since) if speech.actor == other else speech
 
-        for remembered in (self._texts, self._interjected):
+        for remembered in (self._texts, self._interjected, self._formerly):
             for speech in [each for each in remembered if each.actor == other]:
                 told: Any = remembered.pop(speech)
                 if named(speech) not in remembered:
