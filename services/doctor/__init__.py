@@ -1,1 +1,1 @@
-"""Examination of a robot's bus: facts in, findings out. The command `engage doctor` gathers the facts."""
+"""Examination of a robot's bus for `engage doctor`: `service` gathers facts, `findings` judges, `report` shows."""

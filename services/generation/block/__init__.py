@@ -1,1 +1,1 @@
-"""Emission: makes a block of a fragment and of what the policies chose."""
+"""Emission: makes a block of a fragment and of what the policies chose, with the instants of looks and gestures."""

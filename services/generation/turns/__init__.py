@@ -1,1 +1,1 @@
-"""The turn policy: follows the robot's turns, and says how the fragments of one turn follow each other."""
+"""The turn policy: follows the robot's turns, says how their fragments follow each other, and ends a turn early."""

@@ -1,1 +1,4 @@
-"""Live blocks among each other: ties, parts that change hands, holds, and planning beside those that run."""
+"""Live blocks among each other: ties, parts that change hands, holds, and planning beside those that run.
+
+`planning` refuses what is too large.
+"""
