@@ -273,14 +273,14 @@ class Talk(KindRecognizer):
                 speech.part.taken_for = "noise"  # as such it is judged by its words
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
-        """Take the person's leaving: nothing waits any longer."""
+        """Take the person's leaving: nothing waits any longer. What others do in this instant comes before it."""
         if self.speeches.going_on is not None and self.speeches.going_on.until is None:
             self.speeches.going_on.until = until
         self.speeches.going_on = None
         for speech in self._undecided:
             self._decide(speech, at)
         self.go_on(at)
-        self._take_in_order(at, lambda talk: self._is_gone(talk, at, until))
+        self._take_in_order(nextafter(at, inf), lambda talk: self._is_gone(talk, at, until))
 
     def _is_gone(self, talk: Dialogue, at: Seconds, until: Seconds) -> None:
         talk.person_gone(at, until)
