@@ -19,7 +19,8 @@ EntityKind = Literal["object", "person", "hand", "surface"]
 class Entity(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """A thing or a person.
 
-    id: its name in behaviors and messages. kind: only an `object` can be referred to, or be a distractor.
+    id: its name in behaviors and messages, without ` + `.
+    kind: only an `object` can be referred to, or be a distractor.
     position: metres; of a person the face, of an object the center. yaw: radians about z.
     footprint: corners in the entity's own frame, metres (x, y), before turning by `yaw` about z.
     radius: metres around `position`; 0: that of the footprint, or unknown.
