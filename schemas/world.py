@@ -5,7 +5,6 @@ An object that a report of the world leaves out has rarely gone: people's hands 
 """
 
 import math
-from statistics import fmean
 from typing import Literal
 
 from msgspec import Struct
@@ -83,11 +82,13 @@ class World(Struct, frozen=True, kw_only=True, tag="world", omit_defaults=True):
         id: of an object, a person, a hand or a surface; of several together, which are one object at their middle, as
         wide as they lie apart.
         """
+        if TOGETHER not in id:
+            return next((entity for entity in self.entities if entity.id == id), None)
         ids = each_of(id)
         found = [entity for entity in self.entities if entity.id in ids]
-        if len(ids) == 1 or len(found) < len(ids):
-            return found[0] if len(ids) == 1 and found else None
-        x, y, z = (fmean(parts) for parts in zip(*(each.position for each in found), strict=True))
+        if len(found) < len(ids):
+            return None
+        x, y, z = (math.fsum(parts) / len(found) for parts in zip(*(each.position for each in found), strict=True))
         radius = max(math.dist((x, y, z), each.position) + each.extent for each in found)
         return Entity(id=id, kind="object", position=(x, y, z), radius=radius)
 
