@@ -73,7 +73,7 @@ from engage_hri.services.runtime.intake import (
 )
 
 Former = ConnectionEvent | Statistics | SamePeople | Interjection | OpenEvents
-"""Messages of a former life of recognition, which come by no bus."""
+"""Messages of a former life of recognition, which come by no bus, in the order in which they are recalled."""
 Content = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | OngoingActions | World | RobotState | HeadOwner | WordSpoken
     | SyncPointProgress | BlockProgress | HeadPose | Looked | VoiceActivity | Utterance | RequestEvent | SignalTurn

@@ -18,22 +18,13 @@ from msgspec.structs import replace
 from engage_hri.schemas import keys
 from engage_hri.schemas.faults import Fault
 from engage_hri.schemas.messages import Message
-from engage_hri.schemas.recognition import (
-    ConnectionEvent,
-    Interjection,
-    OpenEvents,
-    RequestEvent,
-    SamePeople,
-    SignalTurn,
-    Statistics,
-    session_of,
-)
+from engage_hri.schemas.recognition import ConnectionEvent, Interjection, RequestEvent, SignalTurn, session_of
 from engage_hri.schemas.requests import Cancel
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.bus.deadlines import LATE
 from engage_hri.services.bus.interface import Bus, Received
 from engage_hri.services.recognition.config import RecognitionConfig
-from engage_hri.services.recognition.intake import Intake, reads
+from engage_hri.services.recognition.intake import Former, Intake, reads
 from engage_hri.services.recognition.statistics.tally import is_same_start
 from engage_hri.services.requests.ends import RequestDesk
 from engage_hri.services.runtime.intake import (
@@ -136,8 +127,7 @@ class _Recognition:
                     self.desk.refuse(request, fault)
 
 
-State = ConnectionEvent | Statistics | SamePeople | Interjection | OpenEvents
-ORDER = get_args(State)
+ORDER = get_args(Former)
 """Order in which they are recalled."""
 WINDOW: Seconds = RecognitionConfig().window
 
@@ -159,7 +149,7 @@ class FormerLife:
         """States of this life, by key: as they are in the file, or will be once all has been recalled."""
         self._is_recalled = True
 
-    def recall(self) -> Iterator[State]:
+    def recall(self) -> Iterator[Former]:
         """Read what a former life has kept: recent events, counts, who is the same, words, and then open pairs.
 
         The file stays as it is until the last of it has been taken: until then nothing else has all of it, should
@@ -167,10 +157,10 @@ class FormerLife:
         """
         if self._path is None or not self._path.exists():
             return iter(())
-        states = [msgspec.json.decode(line, type=State) for line in self._path.read_bytes().splitlines()]
+        states = [msgspec.json.decode(line, type=Former) for line in self._path.read_bytes().splitlines()]
         return self._hand_over(sorted(states, key=lambda state: ORDER.index(type(state))))
 
-    def _hand_over(self, states: list[State]) -> Iterator[State]:
+    def _hand_over(self, states: list[Former]) -> Iterator[Former]:
         self._is_recalled = False
         for state in states:
             if isinstance(state, ConnectionEvent):
@@ -189,7 +179,7 @@ class FormerLife:
         elif isinstance(message, Interjection):
             self._keep_interjection(message)
             self._write(self._path)
-        elif isinstance(message, State):
+        elif isinstance(message, Former):
             self._kept[key] = msgspec.json.encode(message)
             self._write(self._path)
 
