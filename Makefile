@@ -83,6 +83,7 @@ generate: $(READY)
 	@$(BIN)/python docs/site/laws_table.py
 	@$(BIN)/python docs/site/vocabulary_table.py
 	@$(BIN)/python docs/site/decisions_list.py
+	@$(BIN)/python docs/site/files_list.py
 
 bench: $(READY)
 	@for file in $$(grep -l __main__ benchmarks/*.py); do echo "== $$file"; $(BIN)/python "$$file" $(ARGS) || exit 1; done

@@ -63,6 +63,27 @@ def test_the_list_of_decisions_is_not_stale_and_tells_what_is_overtaken(
     del sys.modules["decisions_list"]
 
 
+def test_the_list_of_files_is_not_stale_and_wants_a_sentence_of_each(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "site"))
+    import files_list
+
+    assert files_list.page() == files_list.PAGE.read_text(encoding="utf-8"), "make generate"
+    (tmp_path / "services" / "pets").mkdir(parents=True)
+    (tmp_path / "services" / "pets" / "__init__.py").write_text('"""Animals."""\n')
+    (tmp_path / "services" / "pets" / "cat.py").write_text('"""A cat: how\nit purrs.\n\nMore."""\n')
+    (tmp_path / "services" / "pets" / "dog.js").write_text("// Barks\n// at night.\n\n// More.\n")
+    listed = files_list.page(tmp_path).removeprefix(files_list.HEAD)
+    assert (
+        listed == "\n## services/pets/\n\nAnimals.\n\n- `cat.py`: A cat: how it purrs.\n- `dog.js`: Barks at night.\n"
+    )
+    (tmp_path / "services" / "pets" / "cow.py").write_text("MILK = 1\n")
+    with pytest.raises(ValueError, match=r"cow\.py: it does not begin"):
+        files_list.page(tmp_path)
+    del sys.modules["files_list"]
+
+
 def test_make_generate_writes_all_of_it() -> None:
     """Compared elsewhere: the schemas (tests/schemas/test_export.py), docs/vocabulary.md (tests/realizer)."""
     recipe = (ROOT / "Makefile").read_text(encoding="utf-8").partition("\ngenerate:")[2].partition("\n\n")[0]
@@ -74,3 +95,4 @@ def test_make_generate_writes_all_of_it() -> None:
     assert "docs/site/vocabulary_table.py" in recipe
     assert "docs/site/faults_table.py" in recipe
     assert "docs/site/decisions_list.py" in recipe
+    assert "docs/site/files_list.py" in recipe
