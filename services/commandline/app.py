@@ -1,6 +1,7 @@
 """Command line: the table of all commands, each a file in the folder of its family.
 
-The file of a command `X-Y` is `X_Y.py`, with its `Options` and its `main`. It is loaded when its command is called. The list of all commands needs only the table here.
+The file of a command `X-Y` is `X_Y.py`, with its `Options` and its `main`. It is loaded when its command is called:
+the list of all commands needs only the table here.
 """
 
 import gc
