@@ -1,7 +1,8 @@
 """Writes docs/files.md, a line for each file of the code, from what the file says of itself: `make generate`."""
 
 import ast
-from itertools import groupby, takewhile
+from collections.abc import Iterator
+from itertools import groupby, pairwise, takewhile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -9,11 +10,12 @@ PAGE = ROOT / "docs" / "files.md"
 ROOTS = ("schemas", "services")
 COMMENTS = {".py": "", ".js": "//", ".toml": "#"}
 """Kinds of files that are listed, with what begins a line of their comments."""
+OF_NUMBERS = (ast.Constant, ast.BinOp, ast.UnaryOp, ast.operator, ast.unaryop, ast.Name, ast.Load)
 HEAD = """# Files: what each is for
 
-Where is what? Search this page for the word. Each line is what the file says of itself first; `make generate` writes
-it here. What to touch for a change is a table in [CONTRIBUTING.md](../CONTRIBUTING.md), what each test guards is in
-[tests/README.md](../tests/README.md).
+Where is what? Search this page for the word. Each line is what the file says of itself first; below it are its
+numbers that are no settings. `make generate` writes it here. What to touch for a change is a table in
+[CONTRIBUTING.md](../CONTRIBUTING.md), what each test guards is in [tests/README.md](../tests/README.md).
 """
 
 
@@ -27,8 +29,39 @@ def page(root: Path = ROOT) -> str:
 def _folder(folder: Path, files: list[Path], root: Path) -> str:
     init = folder / "__init__.py"
     about = f"\n{first_sentences(init)}\n" if init in files else ""
-    lines = [f"- `{path.name}`: {first_sentences(path)}\n" for path in files if path != init]
+    lines = [line for path in files if path != init for line in _lines(path)]
     return f"\n## {folder.relative_to(root)}/\n{about}" + ("\n" + "".join(lines) if lines else "")
+
+
+def _lines(path: Path) -> Iterator[str]:
+    yield f"- `{path.name}`: {first_sentences(path)}\n"
+    if path.suffix == ".py":
+        yield from (f"  - `{name} = {value}`: {says}\n" for name, value, says in numbers(path))
+
+
+def numbers(path: Path) -> Iterator[tuple[str, str, str]]:
+    """Name, value and meaning of each number that a file of Python has a sentence on, private ones left out."""
+    body = ast.parse(path.read_text(encoding="utf-8")).body
+    for each, after in pairwise(body):
+        match each, after:
+            case (
+                ast.Assign(targets=[ast.Name(id=name)], value=value)
+                | ast.AnnAssign(target=ast.Name(id=name), value=value),
+                ast.Expr(value=ast.Constant(value=str(says))),
+            ) if name[0] != "_" and value is not None and _is_number(value):
+                yield name, ast.unparse(value), _in_one_line(says)
+
+
+def _is_number(value: ast.expr) -> bool:
+    """Whether an expression has nothing but numbers, or names of them, in it: `0.5`, `8 * 1024`, `pi / 4`."""
+    parts = [*ast.walk(value)]
+    kinds = [type(part.value) for part in parts if isinstance(part, ast.Constant)]
+    return bool(kinds) and {*kinds} <= {int, float} and all(isinstance(part, OF_NUMBERS) for part in parts)
+
+
+def _in_one_line(text: str) -> str:
+    """The first paragraph of a text."""
+    return " ".join(text.strip().partition("\n\n")[0].split())
 
 
 def first_sentences(path: Path) -> str:
@@ -41,7 +74,7 @@ def first_sentences(path: Path) -> str:
         says = ast.get_docstring(ast.parse(text)) or ""
     if not says.strip():
         raise ValueError(f"{path}: it does not begin with a sentence on what it is for")
-    return " ".join(says.strip().partition("\n\n")[0].split())
+    return _in_one_line(says)
 
 
 if __name__ == "__main__":

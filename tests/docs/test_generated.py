@@ -70,15 +70,24 @@ def test_the_list_of_files_is_not_stale_and_wants_a_sentence_of_each(
     import files_list
 
     assert files_list.page() == files_list.PAGE.read_text(encoding="utf-8"), "make generate"
-    (tmp_path / "services" / "pets").mkdir(parents=True)
-    (tmp_path / "services" / "pets" / "__init__.py").write_text('"""Animals."""\n')
-    (tmp_path / "services" / "pets" / "cat.py").write_text('"""A cat: how\nit purrs.\n\nMore."""\n')
-    (tmp_path / "services" / "pets" / "dog.js").write_text("// Barks\n// at night.\n\n// More.\n")
-    listed = files_list.page(tmp_path).removeprefix(files_list.HEAD)
-    assert (
-        listed == "\n## services/pets/\n\nAnimals.\n\n- `cat.py`: A cat: how it purrs.\n- `dog.js`: Barks at night.\n"
-    )
-    (tmp_path / "services" / "pets" / "cow.py").write_text("MILK = 1\n")
+    pets = tmp_path / "services" / "pets"
+    pets.mkdir(parents=True)
+    (pets / "__init__.py").write_text('"""Animals."""\n')
+    lives = 'LIVES: int = 3 * 3\n"""Times that it lives.\n\nMore."""\n'
+    others = '_SECRET = 1\n"""Not told."""\nUNTOLD = 4\nNAME = "tom"\n"""Its name."""\n'
+    (pets / "cat.py").write_text('"""A cat: how\nit purrs.\n\nMore."""\n' + lives + others)
+    (pets / "dog.js").write_text("// Barks\n// at night.\n\n// More.\n")
+    assert files_list.page(tmp_path).removeprefix(files_list.HEAD).splitlines() == [
+        "",
+        "## services/pets/",
+        "",
+        "Animals.",
+        "",
+        "- `cat.py`: A cat: how it purrs.",
+        "  - `LIVES = 3 * 3`: Times that it lives.",
+        "- `dog.js`: Barks at night.",
+    ]
+    (pets / "cow.py").write_text("MILK = 1\n")
     with pytest.raises(ValueError, match=r"cow\.py: it does not begin"):
         files_list.page(tmp_path)
     del sys.modules["files_list"]
