@@ -42,6 +42,9 @@ if os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):
 # Else each worker, and each process that is no `engage`, starts a thread of numpy's for each processor, for nothing.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+# Commands run within a worker, and `engage record` gives way to all others: so would each later test of that worker.
+pytest.MonkeyPatch().setattr(os, "nice", lambda by: by)
+
 pytest_plugins = ["engage_hri.services.control.testing.plugin"]
 
 
