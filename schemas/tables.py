@@ -1,4 +1,7 @@
-"""Tables with colored pieces on them, as files of tasks have them: what a task and a camera know of them alike."""
+"""Tables with colored pieces on them, as files of tasks have them: places, forms, and which pieces touch where.
+
+A task and a camera know of them alike.
+"""
 
 import math
 from collections.abc import Iterable
@@ -17,9 +20,12 @@ Point = tuple[float, float]
 """Metres on the table: x ahead of the robot, y to its left."""
 
 LENGTH_TOLERANCE: Meters = 0.005
+"""By how much two edges that touch may differ in length and still be equally long."""
 GAP_TOLERANCE: Meters = 0.012
+"""Distance of the middles of two edges up to which their pieces touch."""
 OVERLAP_TOLERANCE: Meters = 0.004
 ANGLE_TOLERANCE: Radians = math.radians(12.0)
+"""Angle between two edges up to which their pieces touch."""
 
 
 class PiecePose(Struct, frozen=True, array_like=True):

@@ -1,4 +1,6 @@
-"""Nets of live blocks with their tokens, as values: made of `NetPlanned`, `NetMarked` and `NetWaiting` alone.
+"""Nets of live blocks with their tokens, as values, and the lines of what fires and which tokens come.
+
+They are made of `NetPlanned`, `NetMarked` and `NetWaiting` alone.
 
 `feed(nets, message, at, now)` gives the next nets, `told` says what a message changed. `laid_out` says which instant
 is in which column, and which behavior or place between behaviors in which row: the page and the drawing of

@@ -1,4 +1,4 @@
-"""Words for the live view, the log, the tally and the page, so that all say the same.
+"""Words, times and numbers for the live view, the log, the tally and the page, so that all say the same.
 
 Looks, pointings, nods and speech are seen as actions (schemas/perception.py), whoever asks for them. Of all else that
 the robot performs - gestures by name, faces, postures, turns of the head - only those know the names who have the

@@ -1,4 +1,4 @@
-"""Actions of people and of the robot, as all reporters together tell them: the same for every reader. Pure.
+"""Actions of people and of the robot, as all reporters together tell them, and when who is unseen has gone. Pure.
 
     reports = ActionReports("robot", REPORT_GRACE, clock, instant)
     told = reports.take(message, key, source, life, now)    # any message

@@ -1,4 +1,4 @@
-"""A conversation that a model leads: it hears people, answers them, calls tools, and knows what was really said.
+"""A conversation that a model leads: it hears people, answers, calls tools side by side, and knows what was said.
 
     async with connect() as robot, Conversation(robot, "ollama:qwen3", tools=[weather]) as talk:
         await talk.forever()

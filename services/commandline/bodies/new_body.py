@@ -1,7 +1,7 @@
-"""Command `engage new-body`: write the driver of a robot, for its author to go on from.
+"""Command `engage new-body`: write the driver of a robot (`driver.txt`), for its author to go on from.
 
 The file runs and keeps the contract of bodies as it is written, on servos that are simulated. Its author puts an SDK
-in their place, and `engage check-body` then tells what that has changed. Its text is `driver.txt`, beside this file.
+in their place, and `engage check-body` then tells what that has changed. Its text lies beside this file.
 """
 
 import re

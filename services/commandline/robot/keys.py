@@ -1,4 +1,4 @@
-"""Command `engage keys`: certificates for all that take part, and the rules of who may do what."""
+"""Command `engage keys`: certificates of all that take part, for how long, and the rules of who may do what."""
 
 import json
 import sys

@@ -218,7 +218,7 @@ SHOWN = 10
 """Messages that differ that are printed."""
 NEAR: Seconds = 0.05
 """Greatest difference of times that count as the same for the realizer, whose timers were late when it lived: a loop
-that is so late has stood still (`bus/sight.py`)."""
+that is so late has stood still (`bus/deadlines.py`)."""
 
 
 class PlayedService(NamedTuple):

@@ -1,4 +1,4 @@
-"""Course of each behavior on Reachy Mini: the track that it takes, its way to its goal, and its sync points. Pure.
+"""Course of each behavior on Reachy Mini: its track, its way to its goal, how long that takes, its sync points. Pure.
 
 Nods, faces and postures are those of the simulated torso, in the size of this robot. It has no face, so what a face
 would do its antennas do.
@@ -29,6 +29,8 @@ TYPES = tuple(each for each in choreography.TYPES if each not in (Pointing, Gest
 """Types of behaviors that it performs."""
 LEAST = {"head": radians(0.3), "nod": 0.0, "torso": radians(0.4), "face": radians(1.5)}
 """A track that has less to go stays."""
+PACES = {"head": (0.12, 110.0), "nod": (0.3, 60.0), "torso": (0.3, 60.0), "face": (0.25, 300.0)}
+"""Seconds that a way of each track takes at least, and degrees a second; the antennas are the face."""
 ANTENNAS: Mapping[str, tuple[float, float]] = {
     "brow": (-10.0, 45.0), "lid": (-8.0, 70.0), "mouth_corner": (18.0, 60.0), "lips": (-6.0, -6.0),
     "jaw": (-4.0, -4.0),
@@ -79,7 +81,7 @@ def look_at(look: Looks, pose: Angles, world: World, mounting: Mounting) -> tupl
 def seconds(track: str, here: Sequence[float], goal: Sequence[float]) -> Seconds:
     """Natural time of a way; 0: it is none."""
     way = max(abs(b - a) for a, b in zip(here, goal, strict=True))
-    least, speed = {"head": (0.12, 110.0), "face": (0.25, 300.0)}.get(track, (0.3, 60.0))
+    least, speed = PACES[track]
     return 0.0 if way < LEAST[track] + 1e-9 else least + math.degrees(way) / speed
 
 

@@ -1,4 +1,4 @@
-"""The simulated body: a figure whose joints are where the plan has them, but for faults that are scripted."""
+"""The simulated body: a figure whose joints are where the plan has them, but for scripted faults, which it words."""
 
 from collections.abc import Mapping
 from math import inf, radians

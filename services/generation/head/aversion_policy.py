@@ -1,4 +1,6 @@
-"""The policy of looks away: a face is not stared at, neither in long listening nor where a long utterance begins.
+"""The policy of looks away: when the robot's eyes leave a face for a moment, and when they do not.
+
+A face is not stared at, neither in long listening nor where a long utterance begins.
 
 Who listens looks at the speaker nearly always (91 to 96 % of the time in a dialogue coded by hand) and yet not
 without a break: 5 to 9 times a minute the eyes leave the face, for 0.74 to 1.0 s at the median, nine of ten times for

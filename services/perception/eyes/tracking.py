@@ -11,9 +11,8 @@ import numpy as np
 
 from engage_hri.schemas.units import Meters, Seconds
 from engage_hri.services.perception.eyes.head_pose import MeasuredHead
+from engage_hri.services.reports.action_reports import FACE_GRACE
 
-GAP: Seconds = 2.0
-"""Time for which somebody who is not seen may come back as the same; the same as recognition's."""
 SEEN_FOR: Seconds = 0.25
 """Time for which a face is to be seen before it is somebody: what is no face rarely lasts."""
 LOOKED: Seconds = 0.5
@@ -95,6 +94,6 @@ class FaceTracker:
             elif not face.id and at - face.since >= SEEN_FOR:
                 self._named += 1
                 face.id = f"face_{self._named}"
-        gone = [face for face in self._faces if face.missed > (GAP if face.id else LOOKED)]
+        gone = [face for face in self._faces if face.missed > (FACE_GRACE if face.id else LOOKED)]
         self._faces = [face for face in self._faces if face not in gone]
         return [face for face in self._faces if face.id and face.at == at], [face for face in gone if face.id]

@@ -1,4 +1,4 @@
-"""A person with the statistics of Table 2.1 of the thesis: looks, answers and errs by chance, and is sometimes busy.
+"""A person with the statistics of Table 2.1 of the thesis: habits and mistakes by chance, and is sometimes busy.
 
 Pure; chance comes from outside. The person knows only what can be heard and seen of the robot: its words, looks and
 points, as realised. Requests must be in the words of the tangram's; known are the pieces by color and shape, the

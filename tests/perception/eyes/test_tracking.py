@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from engage_hri.services.perception.eyes.head_pose import AHEAD, MeasuredHead
-from engage_hri.services.perception.eyes.tracking import GAP, FaceTracker
+from engage_hri.services.perception.eyes.tracking import FaceTracker
+from engage_hri.services.reports.action_reports import FACE_GRACE
 
 Places = Callable[[float], Iterable[tuple[float, float, float]]]
 RATE = 15
@@ -52,7 +53,7 @@ def test_who_is_not_seen_for_two_seconds_has_gone_and_comes_as_another():
 
     [(name, at)] = seen.gone
     assert name == "face_1"
-    assert 1 + GAP < at < 1 + GAP + 0.2
+    assert 1 + FACE_GRACE < at < 1 + FACE_GRACE + 0.2
     assert {*seen.here[times(5)[-1]]} == {"face_2"}
 
 
