@@ -10,6 +10,7 @@ import logging
 import os
 import signal
 import sys
+from collections import Counter
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from pathlib import Path
 
@@ -84,10 +85,13 @@ def pytest_collect_directory(path: Path, parent: pytest.Collector) -> pytest.Col
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark the long share before `-m` is judged. Long files first: whoever gets the last ends soon after others."""
+    cases: Counter[str] = Counter()
     for item in items:
         test = item.nodeid.partition("::")[2]
         marks = {mark.name for mark in item.iter_markers()}
-        if is_long(item.path, test, real_time="real_time" in marks, each_bus="each_bus" in marks):
+        whole = item.nodeid.partition("[")[0]
+        place, cases[whole] = cases[whole], cases[whole] + 1
+        if is_long(item.path, test, place=place, real_time="real_time" in marks, each_bus="each_bus" in marks):
             item.add_marker("long")
     places = {config.rootpath / "tests" / name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: (places.get(item.path, len(places)), item.path))

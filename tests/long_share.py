@@ -4,9 +4,9 @@ People run `make test` after each small change, and wait for it. It must take mi
 process and in virtual time. The long share is the rest: the operating system, sockets, browsers and packages.
 They wait for other processes, and few changes of the code touch what they guard. CI runs them for each change.
 
-`conftest.py` marks the long share with `long`: each test that is marked `real_time`, and each in a file or folder
-below. A test that is not long and starts a process fails, unless its file is in `SHORT_PROCESSES`. So no test of real
-processes makes `make test` slow unseen.
+`conftest.py` marks the long share with `long`: each test that is marked `real_time`, each in a file or folder below,
+and of some tests all cases but the first few. A test that is not long and starts a process fails, unless its file is
+in `SHORT_PROCESSES`. So no test of real processes makes `make test` slow unseen.
 """
 
 import re
@@ -14,6 +14,7 @@ import subprocess
 import traceback
 from collections.abc import Iterator
 from functools import cache
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -86,6 +87,23 @@ LONG_TESTS = {
         "TestLivingReachyMini": "the laws again, while it breathes",
         "TestNoisyReachyMini": "the laws again, with noise",
     },
+    "cli/test_calibrate_cameras.py": {
+        "test_colors_are_learned_and_a_piece_that_is_not_there_is_told": "pictures of a table; pieces/ has them, too",
+        "test_a_camera_is_placed_and_its_settings_are_read": "pictures of a sheet are drawn and searched",
+    },
+    "client/test_small_talk.py": {
+        "test_in_german_it_greets_answers_shows_pieces_by_their_names_and_says_goodbye": "minutes of a robot",
+        "test_who_wants_help_hears_each_time_other_examples_and_may_ask_for_any_piece": "minutes of a robot",
+    },
+    "control/test_beginners.py": {
+        "test_degrees_are_asked_about_once": "all laws on a body that breaks many",
+    },
+    "control/test_estimates_from_anywhere.py": {
+        "test_a_healthy_body_does_as_it_said": "many poses, each performed; the contract of bodies has the law",
+    },
+    "control/test_slowed_over_table.py": {
+        "test_an_arm_on_its_way_home_from_a_target_takes_a_pace_while_the_trunk_leans": "many ways; another has one",
+    },
     "control/test_calibration.py": {
         "test_as_many_as_are_said_lie_within_the_stated_error": "many calibrations",
     },
@@ -116,6 +134,9 @@ LONG_TESTS = {
     "control/test_liars.py": {
         "test_who_breaks_a_law_is_caught_by_it": "a body for each law; it guards the suite",
     },
+    "docs/test_glossary.py": {
+        "test_a_name_in_the_glossary_is_in_the_code": "it reads the whole tree",
+    },
     "docs/test_making_pages.py": {
         "test_arrows_point_down_and_boxes_keep_apart": "it draws all pictures of the site",
     },
@@ -123,6 +144,7 @@ LONG_TESTS = {
         "test_the_example_of_the_page_runs": "all that hostile peers send; test_nothing_pending.py has them, too",
     },
     "perception/pieces/test_appendix_a.py": {
+        "test_no_piece_of_a_drawn_table_lies_in_another": "many tables are drawn",
         "test_both_find_the_same_on_tables_that_people_lay": "many tables are drawn and searched; the figure is, too",
     },
     "perception/pieces/test_finding.py": {
@@ -131,6 +153,10 @@ LONG_TESTS = {
             for it in (1.5, 0.45)
         },
         "test_the_stated_spread_is_honest": "many pictures, counted",
+        "test_on_an_empty_table_nothing_lies_and_a_hand_is_no_piece": "pictures of hands; test_hands.py has some",
+        "test_a_place_that_a_hand_covers_is_not_bare_and_one_from_which_a_piece_was_taken_is": "the same",
+        "test_a_hand_hides_what_is_under_it_and_nothing_else": "the same",
+        "test_another_camera_sees_the_same": "the same from elsewhere",
     },
     "perception/pieces/test_hands.py": {
         "test_a_piece_that_is_carried_before_a_slow_camera_is_an_act_of_who_carries_it": (
@@ -142,6 +168,9 @@ LONG_TESTS = {
             )
             for skin in range(4)
         },
+        "test_a_piece_that_lies_elsewhere_and_what_has_laid_it_there_long_ago_are_no_hands": "more pictures of hands",
+        "test_two_hands_are_two_and_a_piece_that_one_of_them_holds_is_none": "the same",
+        "test_a_pale_hand_that_stays_does_not_become_the_table": "the same",
         **{f"test_what_a_hand_holds_is_found_and_is_not_the_hand[{skin}]": "another skin" for skin in (1, 2, 3)},
     },
     "perception/pieces/test_pieces.py": {
@@ -163,6 +192,7 @@ LONG_TESTS = {
         "test_a_camera_is_found_by_the_sheet": "pictures of a sheet are drawn and searched",
     },
     "perception/test_lips.py": {
+        "test_who_answers_the_robot_by_voice_is_told_by_the_id_of_their_face": "sound and a robot",
         **{
             f"test_it_is_that_of_whose_lips_go_with_it_and_hardly_ever_anothers[{case}]": "another voice"
             for case in ("still-", "still-f3", "chews-f3", "smiles-", "smiles-f3")
@@ -180,10 +210,31 @@ LONG_TESTS = {
     "realizer/test_vocabulary.py": {
         "test_each_term_is_performed_degraded_or_dropped_as_the_page_says": "all words; conformance/ has the rules",
     },
+    "realizer/test_forecast.py": {
+        "test_a_decision_costs_at_most_in_proportion_in_the_longest_block_that_there_may_be": "long blocks, counted",
+    },
+    "realizer/test_second_lives.py": {
+        "test_a_story_with_ids_that_are_used_again_is_the_one_with_ids_of_their_own": "random stories, each twice",
+    },
+    "recognition/test_coded_timelines.py": {
+        "test_what_differed_once_is_as_coded": "all that once differed; fresh ones are not long",
+    },
+    "recognition/test_memory.py": {
+        "test_a_long_session_keeps_no_more_than_a_short_one": "a long session; growth/ has longer ones",
+    },
+    "recognition/test_identities.py": {
+        "test_memory_stays_flat_however_often_an_id_changes": "thousands of changes",
+    },
     "recognition/test_crowd.py": {
+        "test_a_step_asks_nobody_who_has_gone": "thousands of people",
+        "test_events_and_totals_are_the_same_as_if_nobody_were_forgotten": "hours of people, twice",
         "test_what_is_kept_does_not_grow_with_those_who_have_passed": "thousands of people",
     },
+    "generation/test_again.py": {
+        "test_each_life_of_generation_decides_the_same_again": "many fragments in many lives, twice",
+    },
     "generation/test_same_choices.py": {
+        "test_the_simulated_body_leads_to_the_same_plans": "many fragments; the others of the file ask all bodies",
         "test_far_less_is_asked_than_there_is": "it counts over many fragments what the others of the file compare",
     },
     "recording/test_again.py": {
@@ -193,8 +244,12 @@ LONG_TESTS = {
     "recording/test_analyse.py": {
         "test_the_numbers_of_a_recording_are_those_of_the_live_run": "a whole task, by chance",
     },
+    "recording/test_player.py": {
+        "test_from_deadline_to_deadline_each_message_comes_once_in_order": "random recordings; the scan is not long",
+    },
     "recording/test_realizer_again.py": {
-        "test_the_anchor_scenario_is_performed_the_same": "a whole task; random blocks are performed again, too",
+        "test_random_blocks_are_performed_the_same_in_both_lives": "random blocks in two lives",
+        "test_the_anchor_scenario_is_performed_the_same": "a whole task",
         "test_a_report_of_the_body_that_is_missing_or_came_earlier_is_noticed": "random blocks thrice",
         "test_other_settings_make_it_do_something_else": "random blocks again, with other settings",
     },
@@ -210,6 +265,9 @@ LONG_TESTS = {
     },
     "recording/test_replay.py": {
         "test_a_whole_task_comes_again_message_for_message": "a whole task; the others of the file have the rules",
+    },
+    "requests/test_request_model.py": {
+        "test_where_nobody_dies_callers_are_told_what_was_done_and_services_have_what_was_asked_last": "many at once",
     },
     "requests/test_requests.py": {
         "test_a_desk_forgets_the_oldest_ended_requests_of_who_sends_many_and_no_live_one": "thousands of requests",
@@ -251,6 +309,58 @@ LONG_TESTS = {
 }
 """The same of single tests, classes of tests, or cases, by file."""
 
+FIRST_CASES = {
+    "client/test_stopped_over_a_restart.py": {
+        "test_stop_stops_the_robot_although_recognition_is_away": 4,
+    },
+    "control/mujoco/test_as_simulated.py": {"test_points_are_those_of_the_simulated_torso": 2},
+    "control/test_alive.py": {"test_all_of_it_keeps_the_limits_of_the_joints": 1},
+    "control/test_following.py": {"test_what_moves_is_followed_and_told_where_it_is": 12},
+    "control/test_meets_table.py": {"test_many_poses_at_once_meet_the_table_where_one_of_them_does": 1},
+    "control/test_switching.py": {
+        "test_whatever_fault_comes_no_point_is_reported_that_the_joints_do_not_bear_out": 6,
+    },
+    "client/conversation/test_promises.py": {
+        "test_the_history_of_random_conversations_is_what_a_listener_has_written_down": 1,
+        "test_the_first_word_of_a_call_comes_as_soon_as_that_of_plain_text": 1,
+    },
+    "generation/test_interrupted.py": {"test_each_outcome_says_who_and_what_and_each_word_is_said_once": 3},
+    "generation/test_tied_to_references.py": {"test_whatever_is_tied_to_a_reference_can_be_performed": 6},
+    "judge/test_judge.py": {
+        "test_no_story_breaks_a_law_that_is_enforced": 4,
+        "test_what_once_broke_a_law_breaks_none": 6,
+    },
+    "perception/pieces/test_hands.py": {"test_a_hand_is_found_where_it_is_whatever_its_skin": 1},
+    "perception/test_voice.py": {"test_onsets_and_ends_of_spoken_phrases_are_where_they_can_be_heard": 1},
+    "bus/test_one_history.py": {"test_each_reader_sees_what_it_must_whoever_comes_goes_crashes_or_lies": 2},
+    "realizer/test_faults_on_the_way.py": {"test_a_fault_that_comes_in_the_middle_and_goes": 4},
+    "realizer/test_kept_or_told.py": {"test_what_is_rehearsed_is_what_comes_in_the_performance": 4},
+    "realizer/test_late_loop.py": {
+        "test_no_behavior_breaks_its_block_and_none_is_lost_before_the_body_was_asked": 14,
+    },
+    "realizer/test_on_target.py": {
+        "test_gaze_face_and_posture_meet_the_stroke_of_any_arm": 3,
+        "test_speech_begins_as_all_are_on_target_and_not_before": 3,
+        "test_who_is_on_target_waits_for_a_slow_arm": 3,
+        "test_who_comes_just_in_time_sets_out_no_earlier_than_that": 3,
+        "test_a_gaze_meets_the_word_and_the_stroke_together": 3,
+    },
+    "realizer/test_past_blocks.py": {"test_a_tie_to_a_block_that_ends_is_kept_or_told_whenever_it_comes": 3},
+    "realizer/test_plan_growth.py": {"test_twice_the_block_costs_twice_the_work": 3},
+    "realizer/test_slices.py": {"test_no_try_is_long": 3},
+    "recognition/test_coded_timelines.py": {"test_events_are_those_that_a_coder_writes_down": 2},
+    "recognition/test_each_open_is_decided.py": {
+        "test_each_open_is_decided_once": 1,
+        "test_what_was_told_last_of_each_event_is_told_by_present_ids": 1,
+    },
+    "recognition/test_identities.py": {"test_a_person_whose_id_changes_has_the_events_of_one_whose_id_does_not": 2},
+    "recording/test_again.py": {"test_three_people_and_a_restart_in_the_middle_give_the_same_events": 1},
+    "requests/test_request_model.py": {"test_each_request_ends_exactly_once_and_nothing_is_pending_for_ever": 2},
+    "test_contained.py": {"test_a_bug_ends_one_request_and_the_next_is_served": 8},
+    "text/test_reader.py": {"test_a_long_row_of_marks_is_read_to_its_end": 4},
+}
+"""Tests of many cases that are alike and take long, by file: so many of them, the first, are not long."""
+
 LONG_BUSES = {
     "group": "sessions of one process, with keys: they hear each other in memory; `zenoh` has the sockets",
     "shared": "one session for a whole process; `memory` has what it does within, `zenoh` what it does outside",
@@ -279,13 +389,17 @@ SHORT_PROCESSES: dict[str, str] = {
 """Files of the short share that may start processes, with the reason."""
 
 
-def is_long(path: Path, test: str, *, real_time: bool, each_bus: bool = False) -> bool:
-    """Whether a test belongs to the long share. test: its name in the file, perhaps with its case in brackets."""
+def is_long(path: Path, test: str, *, place: int = 0, real_time: bool, each_bus: bool = False) -> bool:
+    """Whether a test belongs to the long share.
+
+    test: its name in the file, perhaps with its case in brackets. place: of the case among those of its test.
+    """
     name, (whole, _, case) = path.relative_to(TESTS).as_posix(), test.partition("[")
     named = {test, whole, whole.partition("::")[0]}
     is_named = is_long_file(path) or not named.isdisjoint(LONG_TESTS.get(name, ()))
     on_long_bus = each_bus and case.rstrip("]").partition("-")[0] in LONG_BUSES
-    return name != SMOKE and (real_time or is_named or on_long_bus)
+    is_one_of_many = place >= FIRST_CASES.get(name, {}).get(whole, inf)
+    return name != SMOKE and (real_time or is_named or on_long_bus or is_one_of_many)
 
 
 @cache
@@ -305,7 +419,7 @@ def may_have_long(path: Path) -> bool:
     """Whether some test of this file, or folder, may belong to the long share, as is known without loading it."""
     if path.is_dir() or not path.is_relative_to(TESTS):
         return True
-    is_named = path.relative_to(TESTS).as_posix() in LONG_TESTS
+    is_named = path.relative_to(TESTS).as_posix() in LONG_TESTS | FIRST_CASES
     marked = re.search("real_time|each_bus", path.read_text("utf-8"))
     return is_named or is_long_file(path) or (path != TESTS / SMOKE and marked is not None)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from tests.long_share import LONG, LONG_TESTS, SHORT_PROCESSES, SMOKE, is_long, may_have_long
+from tests.long_share import FIRST_CASES, LONG, LONG_TESTS, SHORT_PROCESSES, SMOKE, is_long, may_have_long
 from tests.longest import LONGEST
 from tests.random_cases import share_of, trials
 
@@ -67,6 +67,17 @@ def test_what_is_in_real_time_or_listed_is_long_but_for_the_smoke(
     assert is_long(TESTS / file, test, real_time=real_time) is long
 
 
+def test_of_many_cases_the_first_are_not_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(FIRST_CASES, "a.py", {"test_many": 2, "TestAll::test_many": 1})
+
+    def long(test: str) -> list[bool]:
+        return [is_long(TESTS / "a.py", test, place=place, real_time=False) for place in range(3)]
+
+    assert long("test_many[case]") == [False, False, True]
+    assert long("TestAll::test_many[case]") == [False, True, True]
+    assert long("test_other[case]") == [False, False, False]
+
+
 @pytest.mark.parametrize(
     ("test", "long"), [("test_it[memory]", False), ("test_it[zenoh-True]", False), ("test_it[group-True]", True)]
 )
@@ -93,12 +104,12 @@ def test_for_the_long_share_only_files_are_loaded_that_may_have_some_of_it(name:
 
 def test_what_the_long_share_names_is_there_and_has_a_reason() -> None:
     named = {**LONG, **SHORT_PROCESSES}
-    tests = [(file, test) for file, named in LONG_TESTS.items() for test in named]
+    tests = [(file, test) for share in (LONG_TESTS, FIRST_CASES) for file, named in share.items() for test in named]
 
-    assert [name for name in (*named, *LONG_TESTS) if not (TESTS / name).exists()] == []
+    assert [name for name in (*named, *LONG_TESTS, *FIRST_CASES) if not (TESTS / name).exists()] == []
     assert [each for file, each in tests if not re.search(rf" {each.partition('[')[0]}[(:]", _text(file))] == []
     assert all(named.values())
-    assert all(all(each.values()) for each in LONG_TESTS.values())
+    assert all(all(each.values()) for share in (LONG_TESTS, FIRST_CASES) for each in share.values())
 
 
 def _text(file: str) -> str:

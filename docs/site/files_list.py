@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from itertools import groupby, pairwise, takewhile
 from pathlib import Path
 
@@ -39,10 +40,14 @@ def _lines(path: Path) -> Iterator[str]:
         yield from (f"  - `{name} = {value}`: {says}\n" for name, value, says in numbers(path))
 
 
+@cache
+def _module(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def numbers(path: Path) -> Iterator[tuple[str, str, str]]:
     """Name, value and meaning of each number that a file of Python has a sentence on, private ones left out."""
-    body = ast.parse(path.read_text(encoding="utf-8")).body
-    for each, after in pairwise(body):
+    for each, after in pairwise(_module(path).body):
         match each, after:
             case (
                 ast.Assign(targets=[ast.Name(id=name)], value=value)
@@ -66,12 +71,11 @@ def _in_one_line(text: str) -> str:
 
 def first_sentences(path: Path) -> str:
     """What a file says of itself: its first paragraph, in one line."""
-    text = path.read_text(encoding="utf-8")
     if mark := COMMENTS[path.suffix]:
-        lines = takewhile(lambda line: line.startswith(mark), text.splitlines())
+        lines = takewhile(lambda line: line.startswith(mark), path.read_text(encoding="utf-8").splitlines())
         says = "\n".join(line.removeprefix(mark).strip() for line in lines)
     else:
-        says = ast.get_docstring(ast.parse(text)) or ""
+        says = ast.get_docstring(_module(path)) or ""
     if not says.strip():
         raise ValueError(f"{path}: it does not begin with a sentence on what it is for")
     return _in_one_line(says)
