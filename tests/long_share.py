@@ -26,6 +26,9 @@ LONG = {
     "lab": "several machines on this one: it needs root, and waits for routers that start",
     "test_wheel.py": "it builds the wheel and installs it in environments of their own",
     "docs/test_site.py": "it builds the whole site",
+    "docs/test_glossary.py": "it reads the whole tree",
+    "control/test_estimates_from_anywhere.py": "many poses, each performed; the contract of bodies has the law",
+    "tangram/people/test_human_session.py": "whole tasks; test_human.py has the person alone",
     "mutants": "each test runs pytest on a copy of the tree; it guards a tool and not the robot",
     "cli/test_early_ctrl_c.py": "each test starts `engage` and interrupts it while it loads",
     "control/test_espeak.py": "each of its bodies starts eSpeak NG as a process",
@@ -93,13 +96,11 @@ LONG_TESTS = {
     },
     "client/test_small_talk.py": {
         "test_in_german_it_greets_answers_shows_pieces_by_their_names_and_says_goodbye": "minutes of a robot",
+        "test_two_who_say_nothing_are_both_greeted_and_hear_all_else_once": "minutes of a robot",
         "test_who_wants_help_hears_each_time_other_examples_and_may_ask_for_any_piece": "minutes of a robot",
     },
     "control/test_beginners.py": {
         "test_degrees_are_asked_about_once": "all laws on a body that breaks many",
-    },
-    "control/test_estimates_from_anywhere.py": {
-        "test_a_healthy_body_does_as_it_said": "many poses, each performed; the contract of bodies has the law",
     },
     "control/test_slowed_over_table.py": {
         "test_an_arm_on_its_way_home_from_a_target_takes_a_pace_while_the_trunk_leans": "many ways; another has one",
@@ -134,9 +135,6 @@ LONG_TESTS = {
     "control/test_liars.py": {
         "test_who_breaks_a_law_is_caught_by_it": "a body for each law; it guards the suite",
     },
-    "docs/test_glossary.py": {
-        "test_a_name_in_the_glossary_is_in_the_code": "it reads the whole tree",
-    },
     "docs/test_making_pages.py": {
         "test_arrows_point_down_and_boxes_keep_apart": "it draws all pictures of the site",
     },
@@ -170,6 +168,7 @@ LONG_TESTS = {
         },
         "test_a_piece_that_lies_elsewhere_and_what_has_laid_it_there_long_ago_are_no_hands": "more pictures of hands",
         "test_two_hands_are_two_and_a_piece_that_one_of_them_holds_is_none": "the same",
+        "test_a_piece_under_a_hand_is_told_where_it_lies_or_not_at_all": "the same",
         "test_a_pale_hand_that_stays_does_not_become_the_table": "the same",
         **{f"test_what_a_hand_holds_is_found_and_is_not_the_hand[{skin}]": "another skin" for skin in (1, 2, 3)},
     },
@@ -185,6 +184,7 @@ LONG_TESTS = {
         "test_the_voice_is_that_of_the_only_person_whom_others_tell_of": "minutes of sound",
     },
     "perception/eyes/test_pictures.py": {
+        "test_two_people_are_two_faces_and_a_far_one_is_found": "more pictures",
         "test_a_rendered_person_is_found_and_faces_where_they_do[3]": "another person",
         "test_a_rendered_person_is_found_and_faces_where_they_do[7]": "another person",
     },
@@ -192,11 +192,8 @@ LONG_TESTS = {
         "test_a_camera_is_found_by_the_sheet": "pictures of a sheet are drawn and searched",
     },
     "perception/test_lips.py": {
+        "test_it_is_that_of_whose_lips_go_with_it_and_hardly_ever_anothers": "each voice takes minutes of sound",
         "test_who_answers_the_robot_by_voice_is_told_by_the_id_of_their_face": "sound and a robot",
-        **{
-            f"test_it_is_that_of_whose_lips_go_with_it_and_hardly_ever_anothers[{case}]": "another voice"
-            for case in ("still-", "still-f3", "chews-f3", "smiles-", "smiles-f3")
-        },
     },
     "perception/test_pages_heard.py": {
         "test_a_flood_of_microphones_is_bounded_and_what_is_no_sound_of_ours_is_told": "so many microphones",
@@ -230,8 +227,12 @@ LONG_TESTS = {
         "test_events_and_totals_are_the_same_as_if_nobody_were_forgotten": "hours of people, twice",
         "test_what_is_kept_does_not_grow_with_those_who_have_passed": "thousands of people",
     },
+    "judge/test_judge.py": {
+        "test_points_of_blocks_in_streams_come_when_predicted_mostly": "many streams; a single block is not long",
+    },
     "generation/test_again.py": {
-        "test_each_life_of_generation_decides_the_same_again": "many fragments in many lives, twice",
+        "test_all_that_can_happen_to_a_fragment_happens": "many fragments in many lives",
+        "test_each_life_of_generation_decides_the_same_again": "the same, twice",
     },
     "generation/test_same_choices.py": {
         "test_the_simulated_body_leads_to_the_same_plans": "many fragments; the others of the file ask all bodies",
@@ -300,6 +301,7 @@ LONG_TESTS = {
         "test_all_plots_are_drawn": "it draws with Matplotlib",
     },
     "tangram/collaboration/test_visitors.py": {
+        "test_who_does_nothing_and_looks_away_is_let_go_kindly": "minutes of a whole robot",
         "test_who_looks_at_the_pieces_to_think_is_not_let_go": "minutes of a whole robot; who is let go is not long",
         "test_who_attends_and_does_nothing_is_asked_for_another_piece": "minutes of a whole robot; help is not long",
     },
@@ -310,6 +312,36 @@ LONG_TESTS = {
 """The same of single tests, classes of tests, or cases, by file."""
 
 FIRST_CASES = {
+    "client/test_turn.py": {"test_a_body_that_is_left_stops_the_robot_at_a_word_and_said_is_true": 5},
+    "control/reachy_mini/test_limits.py": {"test_no_target_is_beyond_what_the_joints_are_trusted_with": 3},
+    "control/test_clear_of_table.py": {
+        "test_no_arm_comes_into_the_table_whatever_begins_when": 3,
+        "test_a_gesture_gives_way_to_a_trunk_that_leans_later": 8,
+    },
+    "control/test_moving_trunk.py": {"test_no_joint_leaves_its_limits_in_a_hurry_while_the_trunk_moves": 1},
+    "control/test_postures.py": {"test_while_the_body_moves_they_are_the_same": 2},
+    "generation/test_interruptible.py": {"test_who_may_interrupt_stops_the_robot_and_who_may_not_is_told": 4},
+    "generation/test_own_words_back.py": {"test_the_robot_is_not_stopped_or_answered_by_its_own_words": 2},
+    "generation/test_posture_truth.py": {"test_degrees_expected_are_degrees_turned": 1},
+    "generation/test_several_addressees.py": {"test_a_party_of_three_is_asked_and_who_answers_is_looked_at": 2},
+    "generation/test_talked_into.py": {
+        "test_words_decide_and_not_their_length": 4,
+        "test_who_interrupts_has_answered_wherever_the_threshold_stands": 4,
+        "test_who_is_out_of_sight_for_up_to_two_seconds_can_still_answer": 4,
+        "test_a_typed_line_stops_the_robot_and_is_its_answer": 4,
+    },
+    "generation/test_told_deeds.py": {
+        "test_a_thing_that_cannot_be_looked_at_was_not_looked_at": 3,
+        "test_what_died_while_it_spoke_leaves_the_rest_unknown": 3,
+    },
+    "generation/test_wordless.py": {"test_a_voice_takes_the_floor_after_a_second_and_a_half": 2},
+    "hostile/test_nothing_pending.py": {"test_nothing_is_pending_after_lies_cuts_and_vanished_bodies": 2},
+    "recognition/test_sensor_lag.py": {"test_a_voice_that_is_known_late_has_been_heard_early": 10},
+    "recording/test_damage.py": {
+        "test_one_changed_byte_anywhere_is_told_if_anything_differs": 1,
+        "test_other_damage_is_told_if_anything_differs": 15,
+    },
+    "schemas/test_export.py": {"test_what_the_codec_writes_fits_and_what_fits_it_reads": 20},
     "client/test_stopped_over_a_restart.py": {
         "test_stop_stops_the_robot_although_recognition_is_away": 4,
     },

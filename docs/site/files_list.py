@@ -1,9 +1,8 @@
 """Writes docs/files.md, a line for each file of the code, from what the file says of itself: `make generate`."""
 
-import ast
+import re
 from collections.abc import Iterator
-from functools import cache
-from itertools import groupby, pairwise, takewhile
+from itertools import groupby, takewhile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -11,7 +10,9 @@ PAGE = ROOT / "docs" / "files.md"
 ROOTS = ("schemas", "services")
 COMMENTS = {".py": "", ".js": "//", ".toml": "#"}
 """Kinds of files that are listed, with what begins a line of their comments."""
-OF_NUMBERS = (ast.Constant, ast.BinOp, ast.UnaryOp, ast.operator, ast.unaryop, ast.Name, ast.Load)
+DOCSTRING = re.compile(r'(?:#.*\n)*"""((?:.|\n)+?)"""')
+NUMBER = re.compile(r'^([A-Z]\w*)(?:: \w+)? = ([-\w. */+()]*\d[-\w. */+()]*)\n"""(.+?)"""', re.DOTALL | re.MULTILINE)
+"""A constant with a number in its value and no text, and the sentence below it."""
 HEAD = """# Files: what each is for
 
 Where is what? Search this page for the word. Each line is what the file says of itself first; below it are its
@@ -40,28 +41,10 @@ def _lines(path: Path) -> Iterator[str]:
         yield from (f"  - `{name} = {value}`: {says}\n" for name, value, says in numbers(path))
 
 
-@cache
-def _module(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
-
-
 def numbers(path: Path) -> Iterator[tuple[str, str, str]]:
     """Name, value and meaning of each number that a file of Python has a sentence on, private ones left out."""
-    for each, after in pairwise(_module(path).body):
-        match each, after:
-            case (
-                ast.Assign(targets=[ast.Name(id=name)], value=value)
-                | ast.AnnAssign(target=ast.Name(id=name), value=value),
-                ast.Expr(value=ast.Constant(value=str(says))),
-            ) if name[0] != "_" and value is not None and _is_number(value):
-                yield name, ast.unparse(value), _in_one_line(says)
-
-
-def _is_number(value: ast.expr) -> bool:
-    """Whether an expression has nothing but numbers, or names of them, in it: `0.5`, `8 * 1024`, `pi / 4`."""
-    parts = [*ast.walk(value)]
-    kinds = [type(part.value) for part in parts if isinstance(part, ast.Constant)]
-    return bool(kinds) and {*kinds} <= {int, float} and all(isinstance(part, OF_NUMBERS) for part in parts)
+    for name, value, says in NUMBER.findall(path.read_text(encoding="utf-8")):
+        yield name, value, _in_one_line(says)
 
 
 def _in_one_line(text: str) -> str:
@@ -71,11 +54,12 @@ def _in_one_line(text: str) -> str:
 
 def first_sentences(path: Path) -> str:
     """What a file says of itself: its first paragraph, in one line."""
+    text = path.read_text(encoding="utf-8")
     if mark := COMMENTS[path.suffix]:
-        lines = takewhile(lambda line: line.startswith(mark), path.read_text(encoding="utf-8").splitlines())
+        lines = takewhile(lambda line: line.startswith(mark), text.splitlines())
         says = "\n".join(line.removeprefix(mark).strip() for line in lines)
     else:
-        says = ast.get_docstring(_module(path)) or ""
+        says = found[1] if (found := DOCSTRING.match(text)) else ""
     if not says.strip():
         raise ValueError(f"{path}: it does not begin with a sentence on what it is for")
     return _in_one_line(says)
