@@ -26,6 +26,7 @@ LONG = {
     "lab": "several machines on this one: it needs root, and waits for routers that start",
     "test_wheel.py": "it builds the wheel and installs it in environments of their own",
     "docs/test_site.py": "it builds the whole site",
+    "generation/test_again.py": "many fragments in many lives, each decided twice",
     "docs/test_glossary.py": "it reads the whole tree",
     "control/test_estimates_from_anywhere.py": "many poses, each performed; the contract of bodies has the law",
     "tangram/people/test_human_session.py": "whole tasks; test_human.py has the person alone",
@@ -105,7 +106,14 @@ LONG_TESTS = {
     "control/test_slowed_over_table.py": {
         "test_an_arm_on_its_way_home_from_a_target_takes_a_pace_while_the_trunk_leans": "many ways; another has one",
     },
+    "bus/test_visitors.py": {
+        "test_who_came_and_went_is_forgotten_by_who_watches": "thousands of visitors",
+    },
+    "cli/test_calibrate.py": {
+        "test_what_is_measured_corrects_the_body_and_says_how_well": "many measurements",
+    },
     "control/test_calibration.py": {
+        "test_few_measurements_are_not_taken_for_good_ones": "many calibrations",
         "test_as_many_as_are_said_lie_within_the_stated_error": "many calibrations",
     },
     "control/test_contract.py": {
@@ -230,19 +238,18 @@ LONG_TESTS = {
     "judge/test_judge.py": {
         "test_points_of_blocks_in_streams_come_when_predicted_mostly": "many streams; a single block is not long",
     },
-    "generation/test_again.py": {
-        "test_all_that_can_happen_to_a_fragment_happens": "many fragments in many lives",
-        "test_each_life_of_generation_decides_the_same_again": "the same, twice",
-    },
     "generation/test_same_choices.py": {
         "test_the_simulated_body_leads_to_the_same_plans": "many fragments; the others of the file ask all bodies",
         "test_far_less_is_asked_than_there_is": "it counts over many fragments what the others of the file compare",
     },
     "recording/test_again.py": {
         "test_the_anchor_scenario_gives_the_same_events": "a whole task; three people and a restart are played, too",
+        "test_the_file_of_a_killed_recorder_gives_the_same_events_as_far_as_it_goes": "a whole task again",
+        "test_a_recording_that_begins_in_the_middle_says_that_it_lacks_what_was_before": "a whole task again",
         "test_raw_perception_gives_the_same_events": "a whole task seen by cameras",
     },
     "recording/test_analyse.py": {
+        "test_an_interval_holds_the_true_difference_as_often_as_it_says": "thousands of samples, drawn",
         "test_the_numbers_of_a_recording_are_those_of_the_live_run": "a whole task, by chance",
     },
     "recording/test_player.py": {
@@ -312,6 +319,13 @@ LONG_TESTS = {
 """The same of single tests, classes of tests, or cases, by file."""
 
 FIRST_CASES = {
+    "cli/test_doctor.py": {"test_the_report_fits_and_has_all_that_was_found": 40},
+    "control/reachy_mini/test_looking.py": {
+        "test_joints_that_follow_late_are_expected_at_their_goal_not_before_and_soon_after": 3,
+    },
+    "control/reachy_mini/test_slow_streams.py": {"test_it_comes_to_its_end_late_and_says_so": 10},
+    "realizer/test_replans_at_random.py": {"test_a_block_that_was_held_goes_on_the_same_if_it_is_planned_again": 3},
+    "recognition/test_random_parties.py": {"test_pairs_are_those_of_the_script": 2},
     "client/test_turn.py": {"test_a_body_that_is_left_stops_the_robot_at_a_word_and_said_is_true": 5},
     "control/reachy_mini/test_limits.py": {"test_no_target_is_beyond_what_the_joints_are_trusted_with": 3},
     "control/test_clear_of_table.py": {
