@@ -42,7 +42,7 @@ class Gazes(KindRecognizer):
 
     def outlook(self) -> tuple[Seconds, bool]:
         due, in_contact = inf, self._scene.robot in self.gaze.targets
-        for machine in self._machines():
+        for machine in self._machines() if self.directed else (self.facial,):
             if machine.event is not None:
                 due, in_contact = min(machine.deadline, due), in_contact or machine.is_shared
         return due, in_contact

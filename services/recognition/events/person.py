@@ -83,10 +83,15 @@ class PersonRecognition:
                 due = min(due, self.gazes.look_directs_at() if gaze.ended == inf else gaze.deadline)
             self._looks_due = due
         if part != "looks":
-            self._rest_due, self._rest_touches = min(map(_until, self._doing.values()), default=inf), False
+            due = min(map(_until, self._doing.values())) if self._doing else inf
+            self._rest_touches = False
             for each in self._rest:
-                due, touches = each.outlook()
-                self._rest_due, self._rest_touches = min(due, self._rest_due), touches or self._rest_touches
+                one, touches = each.outlook()
+                if one < due:
+                    due = one
+                if touches:
+                    self._rest_touches = True
+            self._rest_due = due
         self.due = min(self.presence.deadline, self._looks_due, self._rest_due)
         if self.presence.here and (self._looks_touch or self._rest_touches):
             self.contact = 1.0
