@@ -11,8 +11,9 @@ ROOTS = ("schemas", "services")
 COMMENTS = {".py": "", ".js": "//", ".toml": "#"}
 """Kinds of files that are listed, with what begins a line of their comments."""
 DOCSTRING = re.compile(r'(?:#.*\n)*"""((?:.|\n)+?)"""')
-NUMBER = re.compile(r'^([A-Z]\w*)(?:: \w+)? = ([-\w. */+()]*\d[-\w. */+()]*)\n"""(.+?)"""', re.DOTALL | re.MULTILINE)
-"""A constant with a number in its value and no text, and the sentence below it."""
+VALUE = r"[A-Z][\w, ]*(?:: \w+)? = [-\w. */+(),]*\d[-\w. */+(),]*"
+NUMBERS = re.compile(rf'((?:^{VALUE}\n)+)(?:"""((?:.|\n)+?)""")?', re.MULTILINE)
+"""Constants, one below the other, with numbers in their values and no text; and the sentence below them, if any."""
 HEAD = """# Files: what each is for
 
 Where is what? Search this page for the word. Each line is what the file says of itself first; below it are its
@@ -38,13 +39,9 @@ def _folder(folder: Path, files: list[Path], root: Path) -> str:
 def _lines(path: Path) -> Iterator[str]:
     yield f"- `{path.name}`: {first_sentences(path)}\n"
     if path.suffix == ".py":
-        yield from (f"  - `{name} = {value}`: {says}\n" for name, value, says in numbers(path))
-
-
-def numbers(path: Path) -> Iterator[tuple[str, str, str]]:
-    """Name, value and meaning of each number that a file of Python has a sentence on, private ones left out."""
-    for name, value, says in NUMBER.findall(path.read_text(encoding="utf-8")):
-        yield name, value, _in_one_line(says)
+        for constants, says in NUMBERS.findall(path.read_text(encoding="utf-8")):
+            named = ", ".join(f"`{re.sub(': .*? =', ' =', each)}`" for each in constants.splitlines())
+            yield f"  - {named}{says and ': ' + _in_one_line(says)}\n"
 
 
 def _in_one_line(text: str) -> str:

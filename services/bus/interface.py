@@ -1,4 +1,6 @@
-"""The bus, as services see it: one interface, two implementations (`memory`, `zenoh`), one contract suite.
+"""The bus, as services see it, with what becomes of faults and of messages that nobody can read.
+
+It is one interface with two implementations (`memory`, `zenoh`) and one contract suite.
 
 A process opens one `Hub`; each service joins it under its own name and gets a `Bus`. Delivery is by the class of
 the key (`schemas/keys.py`). Messages are frozen structs. Nothing here starts a thread.
@@ -148,7 +150,9 @@ class Bus(ABC):
         times = self._refused.tell(of, kind, self.now())
         if times:
             reason = fault.reason if times == 1 else f"{fault.reason} ({times} times)"
-            self.publish(keys.fault(self.name), replace(fault, reason=reason, service=self.name))
+            told = replace(fault, reason=reason, service=self.name)
+            self.log.warning("refused: %s", told)
+            self.publish(keys.fault(self.name), told)
         return times > 0
 
     def unreadable(self, error: EngageError, sample: Sample) -> Unreadable | None:

@@ -1,4 +1,4 @@
-"""The door as a server: who comes in, how much at once, and each request as one call of `Robot`.
+"""The door as a server: who comes in, how many and how large requests may be, and each as one call of `Robot`.
 
 A request is open until what it asks for is over. If its connection ends before, the call is cancelled, as that of a
 Python program whose task is: the robot stops at a word. So a program that dies leaves nothing going on.

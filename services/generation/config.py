@@ -62,7 +62,7 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     barge_in: Seconds | None = None
     """Seconds of voice after which who speaks into the robot's turn takes the floor, though recognition has not yet
-    decided what it is. None: the robot waits for that in silence, and a laugh never takes the floor."""
+    decided what it is. None: the robot waits for that in silence."""
     policies_off: tuple[str, ...] = ()
     """Names of policies that the robot does not follow. Of the head: "glance", "aversion" (it looks away from faces),
     "response", "mutual" (it keeps eyes that it has met), "listening" (it looks at who speaks), "hands", "face",

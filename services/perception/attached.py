@@ -1,4 +1,4 @@
-"""Settings of a camera of a sense: how its pictures come, and where it stands."""
+"""Settings of a camera of a sense: how its pictures come, how many a second, how large, and where it stands."""
 
 from math import isfinite
 

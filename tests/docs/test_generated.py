@@ -73,8 +73,8 @@ def test_the_list_of_files_is_not_stale_and_wants_a_sentence_of_each(
     pets = tmp_path / "services" / "pets"
     pets.mkdir(parents=True)
     (pets / "__init__.py").write_text('"""Animals."""\n')
-    lives = 'LIVES: int = 3 * 3\n"""Times that it lives.\n\nMore."""\n'
-    others = '_SECRET = 1\n"""Not told."""\nUNTOLD = 4\nNAME = "tom"\n"""Its name."""\n'
+    lives = 'LEAST = 1\nLIVES: int = 3 * 3\n"""Times that it lives.\n\nMore."""\nPAWS, TAILS = 4, 1\n'
+    others = '_SECRET = 1\n"""Not told."""\nNAME = "tom4"\n"""Its name."""\n'
     (pets / "cat.py").write_text('"""A cat: how\nit purrs.\n\nMore."""\n' + lives + others)
     (pets / "dog.js").write_text("// Barks\n// at night.\n\n// More.\n")
     assert files_list.page(tmp_path).removeprefix(files_list.HEAD).splitlines() == [
@@ -84,7 +84,8 @@ def test_the_list_of_files_is_not_stale_and_wants_a_sentence_of_each(
         "Animals.",
         "",
         "- `cat.py`: A cat: how it purrs.",
-        "  - `LIVES = 3 * 3`: Times that it lives.",
+        "  - `LEAST = 1`, `LIVES = 3 * 3`: Times that it lives.",
+        "  - `PAWS, TAILS = 4, 1`",
         "- `dog.js`: Barks at night.",
     ]
     (pets / "cow.py").write_text("MILK = 1\n")

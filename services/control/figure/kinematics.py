@@ -41,7 +41,7 @@ ROOM: Meters = 0.005
 REACH: Meters = 1.5
 """Greatest distance from the shoulder to a target of pointing: farther, people can't tell which object is meant."""
 HAND_TO_TARGET: Meters = 0.06
-"""Least distance from the hand to the surface of a target: pointing is not touching."""
+"""Least distance from the hand to the surface of a target: pointing is not touching. Physics: `mujoco/limbs.py`."""
 NOD_RESERVE: Radians = radians(18.0)
 """Part of the neck's range that gaze keeps free, so that a nod finds room anywhere."""
 _PITCHES: tuple[Radians, ...] = tuple(radians(degrees) for degrees in range(20, -32, -2))

@@ -1,4 +1,4 @@
-"""Reasons for which a turn of the robot ends early: its addressees leave, its speaker is silent, somebody takes over.
+"""Reasons for which a turn of the robot ends early: its addressees leave, its speaker is silent, somebody interrupts.
 
 Whether somebody who speaks into the turn interrupts it recognition decides alone. Until it has, the robot waits.
 """

@@ -1,4 +1,4 @@
-"""Speech of people into the robot's turns, and what came of it: recognition says what it is. Pure."""
+"""Speech of people into the robot's turns: what holds it and what interrupts it, as recognition says. Pure."""
 
 from collections.abc import Callable, Collection, Mapping
 
@@ -11,7 +11,8 @@ from engage_hri.schemas.units import Seconds, Stamp
 from engage_hri.services.reports.same_people import renamed
 
 UNDECIDED: Seconds = 3.0
-"""Time after which the robot goes on although nobody has said what a speech is: recognition may have died. Ours."""
+"""Time for which the robot is silent after somebody has spoken into its turn, and then goes on, if nobody has said
+whether that interrupts it: recognition may have died. Ours."""
 
 
 WORDLESS: Seconds = 1.5

@@ -1,4 +1,4 @@
-"""Behaviors of one block that move the same part: which takes it from which, and which must wait."""
+"""Behaviors of one block that move the same part: which takes it from which, which must wait, and until when."""
 
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""Other live blocks in the plan of a block: when their points come, and who has which part of the body when.
+"""Other live blocks in the plan of a block: when their points come, and who waits for a part that they have.
 
 The others are given: what they were promised is not taken from them. A behavior that has made its stroke hands its
 part over and loses its way home, as within one block; before that, who comes waits, or uses the other arm, or does

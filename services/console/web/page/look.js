@@ -1,4 +1,4 @@
-// Colours and sizes that several pictures share. Colours of the theme are read from the style sheet.
+// Colours and sizes that several pictures share, and how times are written. Colours of the theme are read from the style sheet.
 // Kinds of connection events, as the server knows them: kind, name, whether it is answered, colour, and the mark that
 // tells them apart where there is only a dot.
 const SHADES = [["--gaze", "●"], ["--mutual", "■"], ["--pair", "▲"], ["--back", "◆"], ["--point", "★"], ["--quiet", "✚"]];
