@@ -20,7 +20,7 @@ from engage_hri.schemas.faults import Fault, InputRefused
 from engage_hri.schemas.fragments import EVERYBODY, TurnFragment, TurnStatus
 from engage_hri.schemas.text import word_count
 from engage_hri.schemas.units import Probability
-from engage_hri.schemas.world import Entity, World
+from engage_hri.schemas.world import TOGETHER, Entity, World
 
 NAME = "perform_turn_fragment"
 FILE = f"{NAME}.tool.json"
@@ -38,18 +38,19 @@ Format = Literal["anthropic", "openai", "openai-chat"]
 Expects = Literal["reply", "action"]
 Certainty = Literal["normal", "high"]
 
-ObjectId = Annotated[
-    str,
-    Meta(description="Id of an object, exactly as the world calls it. Never write ids into words to be spoken."),
-]
-
 
 class Say(Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_unknown_fields=True):
     say: Annotated[str, Meta(description="Words to speak. Leave out the words for an object: use `refer` for it.")]
 
 
 class Refer(Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_unknown_fields=True):
-    refer: ObjectId
+    refer: Annotated[
+        str | tuple[str, ...],
+        Meta(
+            description="Id of an object, exactly as the world calls it, or a list of ids to mean several at once "
+            '("these"). Never write ids into words to be spoken.'
+        ),
+    ]
     phrases: Annotated[
         tuple[str, ...],
         Meta(
@@ -194,11 +195,14 @@ def input_schema(world: World | None = None) -> Schema:
         _, refer, look, _ = parts
         if is_listed(world):
             people = [person.id for person in world.people]
+            things = [thing.id for thing in world.objects]
             one, several = whole["properties"]["addressee"]["anyOf"]
+            one_thing, several_things = refer["properties"]["refer"]["anyOf"]
             for schema, ids in (
                 (one, ["", EVERYBODY, *people] if people else []),
                 (several["items"], people),
-                (refer["properties"]["refer"], [thing.id for thing in world.objects]),
+                (one_thing, things),
+                (several_things["items"], things),
                 (look["properties"]["look"], [each.id for each in world.entities if each.kind != "hand"]),
             ):
                 if ids:
@@ -348,7 +352,7 @@ def _behavior(part: Part, number: int) -> tuple[of.FragmentBehavior, str]:
         case Refer(refer=target, phrases=phrases, certainty=certainty):
             reference = of.Reference(
                 id=f"refer-{number}",
-                target=target,
+                target=target if isinstance(target, str) else TOGETHER.join(target),
                 minimum_reliability=RELIABILITY[certainty],
                 options=tuple(map(_option, phrases)) if phrases else None,
             )
@@ -372,6 +376,9 @@ def _part(raw: dict[str, Any], source: str, path: str) -> Part:
         advice = f"give each part exactly one of {', '.join(_KINDS)}"
         raise InputRefused(Fault(reason=f"a part holds {found}", where=_place(source, path), advice=advice))
     part: Part = _converted(raw, kinds[0], source, path)
+    if isinstance(part, Refer) and not part.refer:
+        advice = "give the id of an object, or a list of ids"
+        raise InputRefused(Fault(reason="it names no object", where=_place(source, f"{path}.refer"), advice=advice))
     return part
 
 

@@ -128,3 +128,11 @@ def test_the_start_says_how_long_the_robot_has_and_the_cause():
     log.begins(HUMAN, "point", 1.0, "blue-square")
 
     assert [(event.limit, event.cause) for event in log.events] == [(2.5, "human")]
+
+
+def test_a_fragment_that_looks_at_several_things_at_once_looks_at_each_of_them():
+    log = Log()
+    log.owner("fragment", "pink-triangle + blue-square", 0.5)
+    log.begins(HUMAN, "point", 1.0, "blue-square")
+
+    assert [event.state for event in log.events] == ["started"]

@@ -196,7 +196,8 @@ def test_a_known_world_leaves_only_its_ids_and_tells_what_they_look_like() -> No
     made = input_schema(SCENE)
     _, refer, look, _ = (part["properties"] for part in made["properties"]["parts"]["items"]["anyOf"])
 
-    assert refer["refer"]["enum"] == ["cup-1", "red-square"]
+    one, several = refer["refer"]["anyOf"]
+    assert (one["enum"], several["items"]["enum"]) == (["cup-1", "red-square"], ["cup-1", "red-square"])
     assert refer["refer"]["description"].endswith("There are: cup-1 (red cup), red-square.")
     assert look["look"]["enum"] == ["cup-1", "red-square", "table", "ann"]
     one, several = made["properties"]["addressee"]["anyOf"]
@@ -248,6 +249,12 @@ def test_parts_become_behaviors_one_after_the_other() -> None:
     ]
 
 
+def test_a_list_of_ids_is_one_reference_to_all_of_them() -> None:
+    (reference,) = decoded({"turn_status": "full", "parts": [{"refer": ["cup-1", "red-square"]}]}).behaviors
+
+    assert reference.target == "cup-1 + red-square"  # type: ignore[union-attr]
+
+
 def test_phrases_are_proposed_unless_given_and_words_that_need_a_point_are_known() -> None:
     cup, square = (each for each in decoded(CALL).behaviors if each.id.startswith("refer"))
 
@@ -283,7 +290,9 @@ PART = {"say": "hello"}
         ({"turn_status": "full", "parts": [PART, {"saay": "x"}]}, "$.parts[1]", "only 'saay'", "say, refer, look"),
         ({"turn_status": "full", "parts": [{}]}, "$.parts[0]", "nothing", "exactly one of"),
         ({"turn_status": "full", "parts": [{"say": "x", "refer": "y"}]}, "$.parts[0]", "2 of them", "exactly one"),
-        ({"turn_status": "full", "parts": [{"refer": 7}]}, "$.parts[0].refer", "Expected `str`", ""),
+        ({"turn_status": "full", "parts": [{"refer": 7}]}, "$.parts[0].refer", "Expected `str | array`", ""),
+        ({"turn_status": "full", "parts": [PART, {"refer": []}]}, "$.parts[1].refer", "names no object", "list of"),
+        ({"turn_status": "full", "parts": [{"refer": ""}]}, "$.parts[0].refer", "names no object", "list of"),
         ({"turn_status": "full", "parts": [{**PART, "to": "ann"}]}, "$.parts[0]", "`to`", "known: say"),
         ({"turn_status": "full", "parts": [{"refer": "x", "phrases": "it"}]}, "$.parts[0].phrases", "`array`", ""),
         (

@@ -10,7 +10,7 @@ from engage_hri.schemas.behaviors import Action
 from engage_hri.schemas.fragments import Claim
 from engage_hri.schemas.recognition import InterjectionReading
 from engage_hri.schemas.units import Probability, Seconds
-from engage_hri.schemas.world import World
+from engage_hri.schemas.world import World, each_of
 from engage_hri.services.recognition.config import GazeResolution
 from engage_hri.services.recognition.events.addressing import (
     LONGEST_UNKNOWN,
@@ -428,4 +428,4 @@ class SessionScene:
 
     def fragment_looks_elsewhere(self, entities: tuple[str, ...]) -> bool:
         """True if a fragment's own gaze holds the robot's head for another target."""
-        return self.head_owner.kind == "fragment" and self.head_owner.target not in entities
+        return self.head_owner.kind == "fragment" and {*each_of(self.head_owner.target)}.isdisjoint(entities)
