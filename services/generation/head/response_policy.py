@@ -16,7 +16,7 @@ from engage_hri.schemas.body import Ray
 from engage_hri.schemas.fragments import Claim
 from engage_hri.schemas.recognition import ConnectionEvent
 from engage_hri.schemas.units import Radians, Seconds
-from engage_hri.schemas.world import Entity, World
+from engage_hri.schemas.world import Entity, World, each_of
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.head.policy import HeadPolicy
 from engage_hri.services.generation.head.scene import HeadScene, Observation
@@ -64,8 +64,8 @@ class ResponsePolicy(HeadPolicy):
             if event.kind == "directed_gaze":
                 gaze = scene.state.gaze if scene.state is not None else None
                 targets = viewing_order(event.objects, scene.world, gaze, scene.half_angle)
-            told = scene.owner.target if scene.owner.kind == "fragment" else ""
-            if targets and told in ("", *targets):
+            told = each_of(scene.owner.target) if scene.owner.kind == "fragment" and scene.owner.target else targets
+            if not {*told}.isdisjoint(targets):
                 self._open[event.id] = _Answer(event, targets, now)
         elif event.state == "succeeded" and event.id in self._open:
             self._open[event.id].until = now + RESPONSE_HOLD
