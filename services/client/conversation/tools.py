@@ -1,17 +1,25 @@
 """Tools that a model may call: functions of this program, and what MCP servers offer."""
 
 import inspect
+import logging
 import shlex
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
+from time import monotonic
 from typing import Any, get_type_hints
 
 import msgspec
 
 from engage_hri.schemas.faults import Fault, InputRefused, RunFailed
+from engage_hri.schemas.units import Seconds
 from engage_hri.services.client.conversation.dialects import ToolForm
 from engage_hri.services.runtime.installation import extra_command
+
+HELD: Seconds = 0.5
+"""Time of one call of a tool from which on it is told: meanwhile the robot hears and says nothing."""
+ADVICE = "make it `async def` with a library that awaits, or call it by `await asyncio.to_thread(...)`"
+_log = logging.getLogger("engage.client")
 
 
 @dataclass(frozen=True)
@@ -98,7 +106,10 @@ def function_tool(function: Callable[..., Any]) -> ConversationTool:
 
     async def call(arguments: dict[str, Any]) -> str:
         given = msgspec.convert(arguments, struct)
+        since = monotonic()
         told = function(**{each: getattr(given, each) for each in struct.__struct_fields__})
+        if (held := monotonic() - since) > HELD:
+            _log.warning("the tool %s has held up the whole program for %.1f s: %s", name, held, ADVICE)
         told = await told if inspect.isawaitable(told) else told
         return told if isinstance(told, str) else msgspec.json.encode(told).decode()
 

@@ -11,6 +11,7 @@ import pytest
 from engage_hri import InputRefused, PerceivedPerson, embedded, perceive
 from engage_hri.schemas.fragments import TurnClosed
 from engage_hri.schemas.perception import ActionBegan
+from engage_hri.services.client.conversation import tools
 from engage_hri.services.client.conversation.dialects import ModelFailed
 from engage_hri.services.client.conversation.history import Entry, PersonSaid, RobotSaid
 from engage_hri.services.client.conversation.models import PAUSES, model_of
@@ -178,6 +179,24 @@ async def test_while_a_tool_runs_the_robot_says_so_and_keeps_its_eyes_on_the_per
     gone = [later - at for (at, targets), (later, _) in pairwise(looks) if at > began and targets != ("ann",)]
     assert max(gone, default=0.0) < 3.0, "it looks away now and then, as people do"
     assert SAYS_SO_AFTER == 2.0
+
+
+async def test_a_tool_that_holds_up_the_program_is_told(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = iter([1.0, 1.1, 2.0, 3.5])
+    monkeypatch.setattr(tools, "monotonic", lambda: next(clock))
+
+    def weather(city: str) -> str:
+        """The weather in a city."""
+        return f"fair in {city}"
+
+    tool = tools.function_tool(weather)
+
+    assert await tool.call({"city": "Oslo"}) == "fair in Oslo"
+    assert not caplog.records
+    await tool.call({"city": "Oslo"})
+    assert "the tool weather has held up the whole program for 1.5 s: make it `async def`" in caplog.text
 
 
 async def test_who_speaks_while_a_tool_runs_ends_it() -> None:
