@@ -345,10 +345,12 @@ class AdjacencyPair(Machine):
         return True
 
     def robot_begins(self, action: Action, at: Seconds) -> None:
-        """Take speech or a gesture of the robot, which answers a waiting person."""
+        """Take speech or a gesture of the robot: it answers a waiting person, or goes on with the answer."""
         self._pass_limit(at)
         if self.state == HUMAN_WAITING:
             self._answer("robot_answers", action, at)
+        elif self.event is not None and self.is_cut_into and action == self.event.response:
+            self._response_until = None
 
     def _answer(self, given: str, action: Action, at: Seconds) -> None:
         assert self.event is not None
