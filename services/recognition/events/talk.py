@@ -85,7 +85,7 @@ class Talk(KindRecognizer):
         if is_asked:
             since.append(pair.interrupted_since)
         if sign is not None and (sign.is_beside or is_asked):
-            since += [each.since for each in sign.speeches]
+            since.append(sign.since)
         return (min(since, default=inf), not is_asked, self.id) < answered.place
 
     @property
@@ -499,9 +499,9 @@ class Talk(KindRecognizer):
 
     def go_on(self, now: Seconds) -> None:
         """Tell all in line up to the next speech of which it is not known to whom it is."""
-        if self._line and (waits := self._conversation.listener.waits_until) <= now:
-            self._conversation.pass_time(waits)
         while self._line:
+            if (waits := self._conversation.listener.waits_until) <= now:
+                self._conversation.pass_time(waits)
             at, item = self._line[0]
             self._catch_up(at)
             if (speech := self._undecided_first()) is not None:
