@@ -116,8 +116,8 @@ class People:
         self._drop(other, at, at)
         self._contacts.pop(kept, None)  # what was told of the other may be taken for it
         gazes = [self._scene.gaze, *(person.gazes.gaze for person in self.persons.values())]
-        for speech in (each for person in self.persons.values() for each in person.talk.speeches.in_order()):
-            speech.faces.rename(other, kept)
+        for person in self.persons.values():
+            person.talk.speeches.rename(other, kept)
         for gaze in gazes:
             gaze.targets = tuple(kept if target == other else target for target in gaze.targets)
         if is_found:

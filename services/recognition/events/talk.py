@@ -133,6 +133,7 @@ class Talk(KindRecognizer):
 
     def looks_at(self, face: str, at: Seconds) -> None:
         """Take a look at a face, or away from all ("")."""
+        self.speeches.looks.append((at, face))
         for speech in self._undecided:
             if speech.until is None:
                 speech.faces.turns(face, at)
