@@ -144,6 +144,13 @@ def _is_noise_by(each: Span, speech: Span, before: Timeline) -> bool:
     return is_noise(each if is_known else replace(each, known=None), before)
 
 
+def _calls_another(each: Span, speech: Span, before: Timeline) -> bool:
+    """True if somebody calls the speaker by an id of which nobody knows yet that it is the speaker's."""
+    at = _decided(speech, before)
+    is_another = any(join.who == speech.who and join.is_known and at < join.at for join in before.joins)
+    return is_another and not each.told and _called(each, before) == speech.who
+
+
 def _is_beside_words(sign: Span, before: Timeline) -> bool:
     """True if somebody speaks when a gesture of theirs begins."""
     return any(
@@ -161,7 +168,8 @@ def _answered(speech: Span, before: Timeline) -> str:
             heard += [(until[0], since[0], ROBOT, "") for since, until in turn.speech]
     for each in before.spans:
         is_speech = each.action == "speak" and not _is_noise_by(each, speech, before)
-        if is_speech and speech.who in (each.who, each.to) and _is_known_by(each, speech, before):
+        is_theirs = each.who == speech.who or (each.to == speech.who and not _calls_another(each, speech, before))
+        if is_speech and is_theirs and _is_known_by(each, speech, before):
             heard.append((each.until[0], each.since[0], each.who, each.to))
     recent = [
         (min(until, at), since, who, to) for until, since, who, to in heard if since < at <= until + LIMIT + ROUND

@@ -392,12 +392,14 @@ class Coder:
         is_gesture = sign.action != "speak"
         goes_with_words = is_gesture and (self._words_beside(sign) or not self._is_shown_to_robot(side, sign))
         if sign.since >= side.answers_until and not goes_with_words and not self._is_noise(sign):
-            self._takes_turn(side, sign)
+            if self._timeline.is_worded and _is_late(sign) and sign.seconds <= longest_sound(self._timeline) + ROUND:
+                self._late.append(sign)
+            else:
+                self._takes_turn(side, sign)
 
     def _is_noise(self, sign: Span) -> bool:
         """True for a cough, or a laugh: no words come where they would have come, or too late to say anything."""
-        is_late = sign.known is not None and sign.known[0] > sign.until[0] + WORDS_AFTER + ROUND
-        is_unheard = sign.known is None or (is_late and not self._is_last(sign))
+        is_unheard = sign.known is None or (_is_late(sign) and not self._is_last(sign))
         is_wordless = is_unheard and self._timeline.is_worded and id(sign) not in self._used
         return sign.action == "speak" and is_wordless and sign.seconds <= longest_sound(self._timeline) + ROUND
 
@@ -499,6 +501,11 @@ def has_spoken_since(one: Span, timeline: Timeline) -> bool:
 
 def _speaks_to_robot(each: Span, person: str) -> bool:
     return each.who == person and each.action == "speak" and each.to == ROBOT
+
+
+def _is_late(sign: Span) -> bool:
+    """True if the words of a speech come when nobody waits for them."""
+    return sign.known is not None and sign.known[0] > sign.until[0] + WORDS_AFTER + ROUND
 
 
 def _words_come(speech: Span) -> float:
