@@ -66,8 +66,6 @@ class Listener:
             self.sign = ListenerSign([], is_beside=beside)
         self.sign.parts.append(part)
         self.sign.is_wordless = False  # this one's words may come
-        if part.action == "speak":
-            self._scene.read(self._id, part.since, "open", part.since)
 
     def listens_to(self, part: SignPart) -> bool:
         """True if this is part of the sign."""

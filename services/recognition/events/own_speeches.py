@@ -89,7 +89,6 @@ class OwnSpeeches:
         """Take the words of a speech. told: addressees, if perception knows them."""
         if says_words(words):
             speech.worded_at = at if speech.worded_at == -inf else speech.worded_at
-            self._scene.is_no_noise(speech, at)
         speech.words, speech.told = words or speech.words, told or speech.told
 
     def is_certain(self, speech: OwnSpeech, at: Seconds) -> bool:
@@ -105,7 +104,6 @@ class OwnSpeeches:
         """Take it that the speech is for these."""
         speech.to = to
         if self._scene.robot not in to:
-            speech.is_open = False
             self._writer.decide_interjection(self._id, speech.since, "other", at)
         elif speech.until is None:
             self.may_interrupt(speech, "", at)

@@ -171,9 +171,9 @@ class Talk(KindRecognizer):
         is_in_pause = self._scene.turn is not None and self._scene.turn[0] == self._asked_in_turn
         may_be_in_turn = (is_into_words and is_to_person) or is_in_pause
         is_line = self._scene.lines.get(self.id) == at
-        speech.may_be_noise = self._scene.is_worded and not (is_line or says_words(speech.words))
+        if self._scene.is_worded and not (is_line or says_words(speech.words)):
+            speech.sound = "unsure"
         speech.is_into_turn = may_be_in_turn if self._line else self._conversation.is_into_turn(at)
-        speech.is_open = speech.is_into_turn or speech.is_beside
         self.speeches.is_certain(speech, at)
         self.speeches.may_interrupt(speech, face, at)
         self._queue(at, speech)
@@ -226,10 +226,12 @@ class Talk(KindRecognizer):
             self._writer.interject_again(self.id, since, at)
             return
         self.speeches.hear(speech, words, told, at)
-        if not speech.is_heard or speech.is_noise:
+        if not speech.is_heard or speech.sound == "noise":
             self._has_news(speech, at)
         known, over = speech.words, (at if speech.until is None else speech.until) + WORDS_AFTER
         is_in_time = at <= max(since + WORDS_WAIT, over if speech.is_beside else since) + ROUNDING
+        if speech.sound == "unsure" and says_words(known) and (is_in_time or not self._is_into_words(speech)):
+            self._scene.decide(speech, at)
         # What has been waited for was known when the speech began. The line waits for no words of who is alone.
         if is_in_time and speech.company and any(each is speech for _, each in self._line):
             speech.part.words = known
@@ -247,30 +249,33 @@ class Talk(KindRecognizer):
         speech.part.words = words or speech.part.words
         talk.understand(speech.part, at)
         self._writer.interject_again(self.id, speech.since, at)
-        is_late = speech.is_noise and says_words(speech.words)
+        is_late = speech.sound == "noise" and says_words(speech.words)
         is_new = is_late if speech.is_heard else speech.is_to(self._scene.robot)
         if is_new and self._scene.is_last(self.id, speech.since, at):
             if not speech.is_heard:  # else it is beside a gesture that was told
                 talk.exchange.take(speech.part)
-            speech.is_noise, speech.is_heard = False, True
-            self._scene.floor_changes += 1
+            speech.is_heard = True
+            self._scene.decide(speech, at)
 
     def _has_news(self, speech: OwnSpeech, at: Seconds) -> None:
         """Take news of a speech of which nothing is told yet: it may be for others than it seemed, and no noise."""
-        if speech.is_noise and not says_words(speech.words):
+        is_noise = speech.sound == "noise"
+        if is_noise and not says_words(speech.words):
             return
-        if not self.speeches.is_certain(speech, at) and speech.is_noise and not speech.is_heard:
+        if not self.speeches.is_certain(speech, at) and is_noise and not speech.is_heard:
             self.speeches.address(speech, self._likely(speech, at), at)
         if not speech.is_to(self._scene.robot):
-            speech.is_noise = speech.is_heard = False  # more of the words may still call it
-            speech.part.taken_for = ""
+            speech.is_heard, speech.part.taken_for = False, ""  # more of the words may still call it
+            if is_noise:
+                self._scene.decide(speech, at)
         elif not speech.is_heard and not any(each is speech for _, each in self._line):
             speech.part.until = speech.until
             if speech.until is None:
                 speech.is_heard = True
                 self.take_early(speech.since, lambda talk: talk.speaks(speech.part, beside=speech.is_beside))
             elif speech.is_into_turn or speech.is_beside:
-                speech.is_noise = speech.is_heard = True
+                speech.is_heard = True
+                self._scene.decide(speech, at, is_noise=True)
                 speech.part.taken_for = "noise"  # as such it is judged by its words
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
@@ -425,7 +430,7 @@ class Talk(KindRecognizer):
     def _undecided(self) -> list[OwnSpeech]:
         return [
             each for _, each in self._line
-            if isinstance(each, OwnSpeech) and not each.is_decided and (each.to is None or each.may_be_noise)
+            if isinstance(each, OwnSpeech) and not each.is_decided and (each.to is None or each.sound == "unsure")
         ]  # fmt: skip
 
     def _undecided_first(self) -> OwnSpeech | None:
@@ -444,7 +449,7 @@ class Talk(KindRecognizer):
 
         Of who is alone with it the conversation judges, if it is into the robot's words.
         """
-        may_be_noise = speech.may_be_noise and (speech.company or not self._is_into_words(speech))
+        may_be_noise = speech.sound == "unsure" and (speech.company or not self._is_into_words(speech))
         return speech.is_decided or (speech.to is not None and not may_be_noise)
 
     def _queue(self, at: Seconds, speech: OwnSpeech) -> None:
@@ -462,22 +467,20 @@ class Talk(KindRecognizer):
         if speech.is_to(self._scene.robot):
             speech.is_heard = True
             self._conversation.speaks(speech.part, beside=speech.is_beside)
-            is_sign = self._conversation.listener.listens_to(speech.part)
-            speech.is_open &= is_sign
-            if not is_sign:
-                self._scene.is_no_noise(speech, self._writer.now)
+            if speech.sound == "unsure" and not self._conversation.listener.listens_to(speech.part):
+                self._scene.decide(speech, self._writer.now)
 
     def _decide(self, speech: OwnSpeech, at: Seconds) -> None:
         """Decide what the sound is, by what was known when it was due: nothing, or to whom it is."""
         at = min(at, self._decided_at(speech))  # it may have waited in line since
         to = self._likely(speech, at) if speech.to is None else speech.to
         is_judged_here = not self._is_into_words(speech) or self._scene.robot not in to
-        is_noise = is_judged_here and speech.may_be_noise and speech.until is not None
+        is_noise = is_judged_here and speech.sound == "unsure" and speech.until is not None
         speech.is_decided = True
-        if is_judged_here:
-            self._scene.is_no_noise(speech, at)
+        if is_judged_here and speech.sound == "unsure":
+            self._scene.decide(speech, at, is_noise=is_noise)
         if is_noise:
-            speech.is_noise, speech.is_open, speech.to = True, False, NOBODY
+            speech.to = NOBODY
             self._writer.decide_interjection(self.id, speech.since, "noise", at)
         elif speech.to is None:
             self.speeches.address(speech, to, at)
