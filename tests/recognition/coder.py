@@ -304,16 +304,20 @@ class Coder:
     def _without_late(self, signs: list[Span], turn: Turn) -> list[Span]:
         """Leave out what is said before a turn is cut off, and known to be no listener's only later: it is a turn.
 
-        In company the cut waits in line for the words.
+        A gesture beside it that goes on has answered already.
         """
-        late = [
-            each for each in signs
-            if not company(each, self._timeline) and each.known is not None and turn.until <= each.known and each.until < turn.until
-            and self._is_heard(each) and each.words not in LISTENING
-        ]  # fmt: skip
-        self._turns |= {id(each) for each in late}
-        beside = [each for each in signs for one in late if one.since <= each.since < one.until]
-        return [each for each in signs if each not in beside]
+        for one in signs:
+            if self._comes_after_cut(one, turn) and self._is_heard(one) and one.words not in LISTENING:
+                beside = [each for each in signs if one.since <= each.since < one.until]
+                goes_on = [each for each in beside if each.until > turn.until]
+                self._turns |= set() if goes_on else {id(one)}
+                signs = [each for each in signs if each in goes_on or each not in beside]
+        return signs
+
+    def _comes_after_cut(self, speech: Span, turn: Turn) -> bool:
+        """True if words of who is alone come after a turn is cut off: in company the cut waits in line for them."""
+        is_over = turn.is_aborted and speech.known is not None and speech.until < turn.until <= speech.known
+        return is_over and not company(speech, self._timeline)
 
     def _shows(self, sign: Span) -> bool:
         """True for what shows that somebody listens: a nod, or words; any sound only where no words are told."""
@@ -336,8 +340,11 @@ class Coder:
         beside = self._words_beside(sign)
         own = [
             each for each in beside
-            if each.since < turn.since or (self._interrupts(each, turn) and not self._is_told_late(each, (1e9, 0)))
-        ]  # fmt: skip
+            if each.since < turn.since or (
+                self._interrupts(each, turn)
+                and not (self._is_told_late(each, (1e9, 0)) or self._comes_after_cut(each, turn))
+            )
+        ]
         return sign.action != "speak" and bool(own)
 
     def _words_beside(self, sign: Span) -> list[Span]:
@@ -466,6 +473,8 @@ def is_noise(one: Span, timeline: Timeline) -> bool:
                     return False
                 if one.who in turn.to:
                     longest, wait = WORDS_WAIT, (one.since[0] + WORDS_WAIT + ROUND, LAST)
+                    if not company(one, timeline) and _following(one, timeline) < until:
+                        wait = BEFORE  # it is told when the next sign begins
                 wait = max(wait, until)
     if one.known is None or (one.known > wait and has_spoken_since(one, timeline)):
         return one.seconds <= longest + ROUND
@@ -480,6 +489,17 @@ def company(speech: Span, timeline: Timeline) -> list[str]:
         if each.until[0] - each.since[0] >= FACE_GRACE and each.since[0] + FACE_GRACE + ROUND < at < each.until[0]
     }  # fmt: skip
     return [each for each in timeline.people if each != speech.who and each not in gone]
+
+
+def _following(one: Span, timeline: Timeline) -> Instant:
+    """When the next sign of a person begins that is not at one time with this."""
+    over = one.until
+    for each in sorted(timeline.spans, key=lambda each: each.since):
+        if each.who == one.who and each.to == ROBOT and each.action != "look" and each.since > one.since:
+            if each.since > over:
+                return each.since
+            over = max(over, each.until)
+    return inf, 0
 
 
 def longest_sound(timeline: Timeline) -> float:
