@@ -167,7 +167,6 @@ class Dialogue:
                 self.robot_backchannel.begin(self._robots_backchannel(at), "speaks")
         else:
             pair.robot_begins("speak", at)
-            pair.forget_unanswered()
 
     def robot_falls_silent(self, at: Seconds) -> None:
         self.robot_speaks_since = None
@@ -225,7 +224,6 @@ class Dialogue:
             self.exchange.pair.repaired(at)
         self._drop_robots_sign(at)
         self.exchange.pair.robot_begins("speak", at)
-        self.exchange.pair.forget_unanswered()
 
     def _robot_takes_floor(self, at: Seconds, given: str = "limit") -> None:
         self.exchange.pair.robot_begins("speak", self.robot_backchannel.takes_floor(given, at))

@@ -134,10 +134,9 @@ class Talk(KindRecognizer):
     def looks_at(self, face: str, at: Seconds) -> None:
         """Take a look at a face, or away from all ("")."""
         self.speeches.looks.append((at, face))
-        for speech in self._undecided:
-            if speech.until is None:
-                speech.faces.turns(face, at)
-                self.speeches.may_interrupt(speech, face, at)
+        if (speech := self.speeches.going_on) is not None:
+            speech.faces.turns(face, at)
+            self.speeches.may_interrupt(speech, face, at)
         self.go_on(at)
 
     def begins(self, began: ActionBegan, at: Seconds, face: str) -> None:
@@ -164,12 +163,10 @@ class Talk(KindRecognizer):
         speech.told = self._scene.told_to(self.id, at)
         speech.words = speech.part.words = self._writer.text_of(self.id, at)
         # What waits in line may be the robot's own turn, so that only the scene knows that it has begun.
-        said = self._scene.robot_spoken
-        is_into_words = said is not None and said.since <= at
-        is_to_person = said is not None and said.is_to(self.id)
-        speech.is_beside = is_into_words and not is_to_person
-        is_in_pause = self._scene.turn is not None and self._scene.turn[0] == self._asked_in_turn
-        may_be_in_turn = (is_into_words and is_to_person) or is_in_pause
+        said, turn = self._scene.robot_spoken, self._scene.turn
+        is_to_person = said.is_to(self.id) if said is not None and said.since <= at else None
+        speech.is_beside = is_to_person is False
+        may_be_in_turn = bool(is_to_person) or (turn is not None and turn[0] == self._asked_in_turn)
         is_line = self._scene.lines.get(self.id) == at
         if self._scene.is_worded and not (is_line or says_words(speech.words)):
             speech.sound = "unsure"
@@ -283,8 +280,9 @@ class Talk(KindRecognizer):
         if self.speeches.going_on is not None and self.speeches.going_on.until is None:
             self.speeches.going_on.until = until
         self.speeches.going_on = None
-        for speech in self._undecided:
-            self._decide(speech, at)
+        for _, each in self._line:
+            if isinstance(each, OwnSpeech) and not self._is_known(each):
+                self._decide(each, at)
         self.go_on(at)
         self._take_in_order(nextafter(at, inf), lambda talk: self._is_gone(talk, at, until))
 
@@ -416,7 +414,7 @@ class Talk(KindRecognizer):
         """True if the first in line waits until it is known whether somebody else has answered before."""
         since, (at, first) = self.undecided_since, self._line[0]
         for each in self._writer.answered:
-            if each.began <= at and not self.may_answer_before(each):
+            if each.place[0] <= at and not self.may_answer_before(each):
                 return True  # it is to be told first that this has answered for all
         if since is None or (isinstance(first, QuestionEnd) and first.is_cut_off):
             return since is not None and self._scene.is_contested(self.id, since)
@@ -425,13 +423,6 @@ class Talk(KindRecognizer):
             isinstance(first, QuestionEnd) and self._conversation.exchange.pair.may_be_answered
         )
         return may_matter and self._waits_for_others(since)
-
-    @property
-    def _undecided(self) -> list[OwnSpeech]:
-        return [
-            each for _, each in self._line
-            if isinstance(each, OwnSpeech) and not each.is_decided and (each.to is None or each.sound == "unsure")
-        ]  # fmt: skip
 
     def _undecided_first(self) -> OwnSpeech | None:
         """The first in line, if it is a speech that is not decided; None: it is to be told next."""
@@ -445,7 +436,7 @@ class Talk(KindRecognizer):
         return is_into_words and (may_be if speech.to is None else speech.is_to(self._scene.robot))
 
     def _is_known(self, speech: OwnSpeech) -> bool:
-        """True if it is known to whom the first speech in line is, and that it is no cough.
+        """True if it is known to whom a speech in line is, and that it is no cough.
 
         Of who is alone with it the conversation judges, if it is into the robot's words.
         """
