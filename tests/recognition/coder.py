@@ -339,8 +339,10 @@ class Coder:
         """True for a gesture beside the person's own words, if these are no listener's: it says nothing more."""
         beside = self._words_beside(sign)
         own = [
-            each for each in beside
-            if each.since < turn.since or (
+            each
+            for each in beside
+            if each.since < turn.since
+            or (
                 self._interrupts(each, turn)
                 and not (self._is_told_late(each, (1e9, 0)) or self._comes_after_cut(each, turn))
             )
@@ -372,7 +374,9 @@ class Coder:
         In company also with words that come later: it has waited for them, and what is known late has happened early.
         """
         decided = min(answer.until[0], answer.since[0] + (WORDS_WAIT if self._timeline.is_worded else BRIEF))
-        is_told_late = bool(company(answer, self._timeline)) and self._is_heard(answer) and answer.words not in LISTENING
+        is_told_late = (
+            bool(company(answer, self._timeline)) and self._is_heard(answer) and answer.words not in LISTENING
+        )
         return answer.action == "speak" and (decided < turn.until[0] - ROUND or is_told_late)
 
     def _interrupts(self, speech: Span, turn: Turn) -> bool:

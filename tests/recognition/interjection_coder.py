@@ -10,7 +10,16 @@ from itertools import pairwise
 from msgspec import Struct
 
 from engage_hri.schemas.recognition import Interjection
-from tests.recognition.coder import BRIEF, LAST, ROUND, WORDS_AFTER, WORDS_WAIT, has_spoken_since, is_noise, longest_sound
+from tests.recognition.coder import (
+    BRIEF,
+    LAST,
+    ROUND,
+    WORDS_AFTER,
+    WORDS_WAIT,
+    has_spoken_since,
+    is_noise,
+    longest_sound,
+)
 from tests.recognition.observations import ROBOT
 from tests.recognition.timeline import LISTENING, Instant, Span, Timeline, Turn
 
