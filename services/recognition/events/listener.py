@@ -175,7 +175,7 @@ class Listener:
             return False
         speech = sign.speeches[-1]
         may_come = self._writer.now < speech.since + WORDS_WAIT and not self._asks_for_nothing(speech)
-        return may_come and speech.since < part.since
+        return may_come and speech.since <= part.since
 
     def understand(self, speech: SignPart, at: Seconds, *, in_turn: bool, is_last: bool) -> None:
         """Judge a speech by its words.
