@@ -139,9 +139,13 @@ def _is_known_by(each: Span, speech: Span, before: Timeline) -> bool:
 
 
 def _is_noise_by(each: Span, speech: Span, before: Timeline) -> bool:
-    """True if no words of somebody's sound are known when it is decided to whom another speech is."""
+    """True if no words of somebody's sound are known when it is decided to whom another speech is.
+
+    Late words of one's own say nothing as long as what one has begun before they came may be for the robot.
+    """
     is_known = each.known is not None and each.known <= _decided(speech, before)
-    return is_noise(each if is_known else replace(each, known=None), before)
+    said = replace(before, spans=[*before.spans, replace(speech, to=ROBOT)])
+    return is_noise(each if is_known else replace(each, known=None), said)
 
 
 def _calls_another(each: Span, speech: Span, before: Timeline) -> bool:
