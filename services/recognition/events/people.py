@@ -275,8 +275,7 @@ def _keep(kept: dict[str, Value], id: str, value: Value | None) -> bool:
 
 def _answered_by_other(taken_up: TakenUp, asked: PersonRecognition) -> None:
     """Tell the person who was asked that somebody else has answered."""
-    _, by, action, at = taken_up
-    asked.talk.take_early(at, lambda talk: talk.exchange.pair.other_answers(by, action, at))
+    asked.talk.take_early(taken_up.at, lambda talk: talk.exchange.pair.other_answers(*taken_up[1:]))
 
 
 def _answered_for_all(answered: OngoingEvent, at: Seconds, asked: PersonRecognition) -> None:

@@ -272,8 +272,7 @@ class SessionScene:
 
     def decide(self, spoken: Spoken, at: Seconds, *, is_noise: bool = False) -> None:
         """Note what a sound is: it counts for what others say since then."""
-        if spoken.sound == "unsure":
-            spoken.noted_at = max(at, spoken.noted_at)
+        spoken.noted_at = max(at, spoken.noted_at) if spoken.sound == "unsure" else spoken.noted_at
         spoken.sound = "noise" if is_noise else "speech"
         self.floor_changes += 1
 

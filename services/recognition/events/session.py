@@ -112,8 +112,8 @@ class Session:
 
     def has_open_event(self, person: str) -> bool:
         """True if an event with the person is open, or asked for and not begun."""
-        live = (event for event, _ in self._live.values())
-        return self._writer.has_open(person) or any(person in (each.initiator, each.responder) for each in live)
+        is_asked = any(person in (event.initiator, event.responder) for event, _ in self._live.values())
+        return is_asked or self._writer.has_open(person)
 
     def floor(self) -> list[Spoken]:
         """All speeches that go on, the first first; their addressees may not be known yet."""

@@ -67,8 +67,7 @@ class Talk(KindRecognizer):
     @property
     def undecided_since(self) -> Seconds | None:
         """Start of the first of what the person says of which it is not known whether it is for the robot."""
-        listener = self._conversation.listener
-        beside = None if listener.sign is None else listener.beside_since
+        beside = self._conversation.listener.beside_since
         return self._line[0][0] if beside is None and self._line else beside
 
     @property
@@ -167,9 +166,8 @@ class Talk(KindRecognizer):
         is_to_person = said.is_to(self.id) if said is not None and said.since <= at else None
         speech.is_beside = is_to_person is False
         may_be_in_turn = bool(is_to_person) or (turn is not None and turn[0] == self._asked_in_turn)
-        is_line = self._scene.lines.get(self.id) == at
-        if self._scene.is_worded and not (is_line or says_words(speech.words)):
-            speech.sound = "unsure"
+        is_unsure = self._scene.is_worded and not says_words(speech.words)
+        speech.sound = "unsure" if is_unsure and self._scene.lines.get(self.id) != at else "speech"
         speech.is_into_turn = may_be_in_turn if self._line else self._conversation.is_into_turn(at)
         self.speeches.is_certain(speech, at)
         self.speeches.may_interrupt(speech, face, at)
@@ -267,11 +265,10 @@ class Talk(KindRecognizer):
                 self._scene.decide(speech, at)
         elif not speech.is_heard and not any(each is speech for _, each in self._line):
             speech.part.until = speech.until
+            speech.is_heard = speech.until is None or speech.is_into_turn or speech.is_beside
             if speech.until is None:
-                speech.is_heard = True
                 self.take_early(speech.since, lambda talk: talk.speaks(speech.part, beside=speech.is_beside))
-            elif speech.is_into_turn or speech.is_beside:
-                speech.is_heard = True
+            elif speech.is_heard:
                 self._scene.decide(speech, at, is_noise=True)
                 speech.part.taken_for = "noise"  # as such it is judged by its words
 
