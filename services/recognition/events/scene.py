@@ -66,6 +66,13 @@ class Worded(Struct, frozen=True, kw_only=True):
     """Addressees, if perception knows them."""
 
 
+class Called(Struct, frozen=True, kw_only=True):
+    """Observation: names by which people call somebody are known from now on."""
+
+    actor: str
+    names: tuple[str, ...]
+
+
 class Question(NamedTuple):
     """A question of the robot that waits. since: end of its turn. until: time by which an answer has to begin.
 

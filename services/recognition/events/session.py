@@ -30,7 +30,7 @@ from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING,
 from engage_hri.services.recognition.events.machine import Effect, EventWriter, Mishap, OngoingEvent
 from engage_hri.services.recognition.events.people import People
 from engage_hri.services.recognition.events.person import Part, PersonRecognition
-from engage_hri.services.recognition.events.scene import Covered, SessionScene, Worded
+from engage_hri.services.recognition.events.scene import Called, Covered, SessionScene, Worded
 from engage_hri.services.recognition.events.talk import Step
 from engage_hri.services.reports.ongoing_actions import GoesOn
 
@@ -47,7 +47,7 @@ SETTLING: Seconds = 0.35
 Decision 0009."""
 Observation = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | RequestEvent | SignalTurn | Cancel
-    | GoesOn | Worded | SyncPointProgress | BlockProgress | HeadOwner | World | RobotState
+    | GoesOn | Worded | Called | SyncPointProgress | BlockProgress | HeadOwner | World | RobotState
 )  # fmt: skip
 TURNS_KEPT = 64
 """Number of ended turns that are remembered, for a pair announced after the end of its turn; aborted ones too."""
@@ -102,6 +102,7 @@ class Session:
             Worded: self._understand, RequestEvent: self._request, SignalTurn: self._signal, Cancel: self._cancel,
             SyncPointProgress: self._point_realised, BlockProgress: self._block_progresses,
             RobotState: self._robot_is_heard, HeadOwner: self._head_owner_changed,
+            Called: lambda called, at: self.scene.call(called.actor, *called.names),
         }  # fmt: skip
         """What each kind of observation changes."""
 
@@ -112,17 +113,13 @@ class Session:
 
     def has_open_event(self, person: str) -> bool:
         """True if an event with the person is open, or asked for and not begun."""
-        is_asked = any(person in (event.initiator, event.responder) for event, _ in self._live.values())
-        return is_asked or self._writer.has_open(person)
+        live = (each for each, _ in self._live.values())
+        return self._writer.has_open(person) or any(person in (each.initiator, each.responder) for each in live)
 
     def floor(self) -> list[Spoken]:
         """All speeches that go on, the first first; their addressees may not be known yet."""
-        said = self.scene.robot_spoken
-        speeches: list[Spoken] = [] if said is None else [said]
-        for person in self.persons.values():
-            if person.presence.here and (speech := person.talk.speeches.going_on) is not None:
-                speeches.append(speech)
-        return sorted(speeches, key=lambda each: (each.since, each.actor))
+        speeches = (each.talk.speeches.going_on for each in self.persons.values() if each.presence.here)
+        return sorted(filter(None, (self.scene.robot_spoken, *speeches)), key=lambda each: (each.since, each.actor))
 
     # -- time ---------------------------------------------------------------------------------------------------
 
