@@ -54,7 +54,7 @@ from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.history import Latest
 from engage_hri.services.recognition.events.machine import Mishap, PersonForgotten
 from engage_hri.services.recognition.events.open_events import OpenEventTracker
-from engage_hri.services.recognition.events.scene import Worded
+from engage_hri.services.recognition.events.scene import Called, Worded
 from engage_hri.services.recognition.perceive.clocks import ClockErrors, ClockRestarts
 from engage_hri.services.recognition.perceive.identities import Identities, Join, Parting
 from engage_hri.services.recognition.perceive.words import TimedWords
@@ -231,13 +231,13 @@ class Intake:
             self._note(self._recognizer.join(other, kept, now, speaks=speaks))
             for each in going:
                 self._feed(each, now)
-        session.scene.call(kept, other, join.before, join.name)
+        self._feed(Called(actor=kept, names=(other, join.before, join.name)), now)
 
     def _part(self, parting: Parting) -> None:
         """Take a person for another than was guessed. What is open with them is told as theirs from now on."""
         at, actor = Stamp(self._clock.name, self._now), parting.id
         self._tell(self._reports.part(parting.leaving, parting.old, parting.new, self._now))
-        self._recognizer.session.scene.call(parting.new, *parting.leaving, parting.new)
+        self._feed(Called(actor=parting.new, names=(*parting.leaving, parting.new)), self._now)
         if actor == parting.new:
             return  # recognition knows whose id it was by that person's own
         for id, before in tuple(self._told.items()):
@@ -334,7 +334,7 @@ class Intake:
         match observation:
             case HeadOwner(since=stamp) | World(at=stamp):
                 pass
-            case Cancel() | GoesOn() | Worded() | TimedWords():
+            case Cancel() | GoesOn() | Worded() | Called() | TimedWords():
                 stamp = None
             case _:
                 stamp = observation.at

@@ -97,7 +97,7 @@ def _quiet(timeline: Timeline) -> Iterator[float]:
     ]
     for _, until in busy:
         at = until + QUIET
-        if not any(since < at and end > until for since, end in busy):
+        if not any(since <= at and end > until for since, end in busy):
             yield at
 
 

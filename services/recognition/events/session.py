@@ -30,7 +30,7 @@ from engage_hri.services.recognition.events.limits import BLOCKS_KEPT, ROUNDING,
 from engage_hri.services.recognition.events.machine import Effect, EventWriter, Mishap, OngoingEvent
 from engage_hri.services.recognition.events.people import People
 from engage_hri.services.recognition.events.person import Part, PersonRecognition
-from engage_hri.services.recognition.events.scene import Covered, SessionScene, Worded
+from engage_hri.services.recognition.events.scene import Called, Covered, SessionScene, Worded
 from engage_hri.services.recognition.events.talk import Step
 from engage_hri.services.reports.ongoing_actions import GoesOn
 
@@ -47,7 +47,7 @@ SETTLING: Seconds = 0.35
 Decision 0009."""
 Observation = (
     ActionBegan | ActionEnded | ActorFound | ActorLost | RequestEvent | SignalTurn | Cancel
-    | GoesOn | Worded | SyncPointProgress | BlockProgress | HeadOwner | World | RobotState
+    | GoesOn | Worded | Called | SyncPointProgress | BlockProgress | HeadOwner | World | RobotState
 )  # fmt: skip
 TURNS_KEPT = 64
 """Number of ended turns that are remembered, for a pair announced after the end of its turn; aborted ones too."""
@@ -80,8 +80,6 @@ class Session:
         """Persons with a task in hand."""
         self.contacts = self._people.contacts
         """Tells contact with each person for whom it has changed since the last call."""
-        self.has_open_event = self._writer.has_open
-        """Tells whether an event is open with a person."""
         self.remember = self._writer.remember
         """Takes an interjection that a former life has told, so that it is not told again."""
         self._ended_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
@@ -104,6 +102,7 @@ class Session:
             Worded: self._understand, RequestEvent: self._request, SignalTurn: self._signal, Cancel: self._cancel,
             SyncPointProgress: self._point_realised, BlockProgress: self._block_progresses,
             RobotState: self._robot_is_heard, HeadOwner: self._head_owner_changed,
+            Called: lambda called, at: self.scene.call(called.actor, *called.names),
         }  # fmt: skip
         """What each kind of observation changes."""
 
@@ -112,14 +111,15 @@ class Session:
         """True if more than one person is here."""
         return len(self.scene.company("")) > 1
 
+    def has_open_event(self, person: str) -> bool:
+        """True if an event with the person is open, or asked for and not begun."""
+        live = (each for each, _ in self._live.values())
+        return self._writer.has_open(person) or any(person in (each.initiator, each.responder) for each in live)
+
     def floor(self) -> list[Spoken]:
         """All speeches that go on, the first first; their addressees may not be known yet."""
-        said = self.scene.robot_spoken
-        speeches: list[Spoken] = [] if said is None else [said]
-        for person in self.persons.values():
-            if person.presence.here and (speech := person.talk.speeches.going_on) is not None:
-                speeches.append(speech)
-        return sorted(speeches, key=lambda each: (each.since, each.actor))
+        speeches = (each.talk.speeches.going_on for each in self.persons.values() if each.presence.here)
+        return sorted(filter(None, (self.scene.robot_spoken, *speeches)), key=lambda each: (each.since, each.actor))
 
     # -- time ---------------------------------------------------------------------------------------------------
 
