@@ -127,9 +127,10 @@ def solved(points: Floats, width: int, height: int, focal: float, face: AverageF
     ahead = rotation @ AHEAD
     angles = np.array(yaw_pitch(ahead))
     a, b = np.clip(angles - yaw_pitch(-place), -LEARNED, LEARNED)
-    signs = [[1.0, a, b, a * a, b * b, a * b], _beside(model @ rotation.T, place, weights, seen, depth) @ rotation]
+    beside = _beside(model @ rotation.T, place, weights, seen, depth) @ rotation
+    signs = np.hstack([1.0, a, b, a * a, b * b, a * b, beside.ravel()])
     turned_by = float(np.arccos(np.clip(-ahead @ place / np.linalg.norm(place), -1, 1)))
-    return LaidFace(place, angles, np.hstack([np.ravel(each) for each in signs]), np.array([1.0, turned_by]))
+    return LaidFace(place, angles, signs, np.array([1.0, turned_by]))
 
 
 def turn(by: Floats) -> Floats:
@@ -193,4 +194,4 @@ def _beside(turned: Floats, place: Floats, weights: Floats, seen: Floats, depth:
     flat = seen * at[:, 2:] - at[:, :2]
     deep = depth * place[2] - turned[:, 2]
     beside = np.column_stack([flat, deep - np.average(deep, weights=weights)]) * 1000
-    return np.clip(beside, -MOST_BESIDE, MOST_BESIDE)
+    return np.asarray(np.clip(beside, -MOST_BESIDE, MOST_BESIDE))

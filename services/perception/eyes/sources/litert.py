@@ -210,12 +210,9 @@ def around(points: Floats) -> Crop:
 
 def _mean(crops: Sequence[tuple[Crop, float]]) -> Crop:
     """A square between several, by their weights."""
-    weights = [weight for _, weight in crops]
-    axes, middle, side = (
-        np.average([part(crop) for crop, _ in crops], axis=0, weights=weights)
-        for part in (lambda crop: crop.axes[0], lambda crop: crop.middle, lambda crop: crop.side)
-    )
-    return Crop(middle, float(side), float(np.arctan2(axes[1], axes[0])))
+    each = [[*crop.middle, crop.side, *crop.axes[0]] for crop, _ in crops]
+    x, y, side, across, down = np.average(each, axis=0, weights=[weight for _, weight in crops]).tolist()
+    return Crop(np.array([x, y]), side, float(np.arctan2(down, across)))
 
 
 def _parts(image: Image) -> Iterator[tuple[int, int, int]]:
