@@ -30,7 +30,7 @@ SMALLEST = 8
 LEARNED: Radians = 0.8
 """Angle from the line of sight up to which the mending was learned."""
 MOST_BESIDE = 30.0
-"""Millimetres by which a point is beside that of the face at most: of those learned from one in 2000 is more."""
+"""Millimetres by which a point is beside that of the face at most: hardly one of 1000 is."""
 LEAST_SPREAD, MOST_SPREAD = 0.01, pi / 4
 UPPER_LIP, LOWER_LIP, FOREHEAD, CHIN = 13, 14, 10, 152
 AHEAD = np.array([0.0, 0.0, -1.0])
