@@ -1,9 +1,10 @@
 """Eyes on rendered people of whom nothing was learned: faces found, errors of heads, processor time of a picture.
 
-python benchmarks/eyes.py [--pictures 24] [--first 100] [--page] [--json]     (`make eyes` fetches what it needs)
+python benchmarks/eyes.py [--pictures 24] [--first 100] [--people 5001] [--page] [--json]
 
---pictures: of each of ten people. --first: number of the first person, as a seed of the pictures. --page: what a page
-finds in the same ones, in Chromium, beside that.
+`make eyes` fetches what it needs. --pictures: of each of ten people. --first: number of the first person, as a seed
+of the pictures. --people: ten others are made up, from this seed on; those who are learned from have smaller ones.
+--page: what a page finds in the same pictures, in Chromium, beside that.
 """
 
 import argparse
@@ -34,14 +35,14 @@ from tests.perception.eyes.cases import CHUNKS, cases
 from tests.perception.eyes.fetched import MODELS
 from tests.perception.eyes.film_of_looks import habit, stray
 from tests.perception.eyes.page_faces import found as found_by_page
-from tests.perception.eyes.people import CAMERA, JUDGED
+from tests.perception.eyes.people import CAMERA, JUDGED, Looks, crowd
 
 FIRST = 100
 """Number of the first person who is judged, as a seed: those who are learned from have smaller ones."""
 SURE = 6
 """Pictures of each person in which it is known where the head points, for what is learned of them."""
-Chunk = tuple[int, int, int, int]
-"""Person, seed of the person, part, and number of pictures in it."""
+Chunk = tuple[int, Looks, int, int, int]
+"""Person, how it looks, seed of its pictures, part, and number of pictures in it."""
 TIMES = 20
 """How often each picture is looked at, for its processor time."""
 
@@ -67,9 +68,9 @@ class Measured(NamedTuple):
 
 
 def measured(chunk: Chunk) -> list[Measured]:
-    person, seed, number, count = chunk
+    person, looks, seed, number, count = chunk
     found = []
-    for case in cases(JUDGED[person], seed, number, count):
+    for case in cases(looks, seed, number, count):
         finder = FaceFinder(MODELS, 4)
         begin = time.process_time()
         for _ in range(TIMES):
@@ -168,9 +169,7 @@ def after_sure_looks(rows: Sequence[Measured]) -> dict[str, float]:
 
 def in_a_page(chunks: Sequence[Chunk]) -> dict[str, float]:
     """Compare what a page finds with what LiteRT does."""
-    pictures = [
-        case.picture for person, seed, number, count in chunks for case in cases(JUDGED[person], seed, number, count)
-    ]
+    pictures = [case.picture for chunk in chunks for case in cases(*chunk[1:])]
     apart, missed = [], 0
     for by_page, picture in zip(asyncio.run(found_by_page(pictures)), pictures, strict=True):
         here = FaceFinder(MODELS, 4).find(picture)
@@ -192,11 +191,15 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--pictures", type=int, default=24)
     parser.add_argument("--first", type=int, default=FIRST)
+    parser.add_argument("--people", type=int)
     parser.add_argument("--page", action="store_true")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
-    parts = [(who, part) for who in range(len(JUDGED)) for part in range(CHUNKS)]
-    chunks = [(who, options.first + who, part, options.pictures // CHUNKS) for who, part in parts]
+    people = JUDGED if options.people is None else crowd(range(options.people, options.people + len(JUDGED)))
+    count = options.pictures // CHUNKS
+    chunks = [
+        (who, looks, options.first + who, part, count) for who, looks in enumerate(people) for part in range(CHUNKS)
+    ]
     with Pool(2) as pool:
         rows = [row for found in pool.map(measured, chunks, 1) for row in found]
     figures = summary(rows) | after_sure_looks(rows) | (in_a_page(chunks) if options.page else {})

@@ -2,10 +2,10 @@
 
 A rigid face is laid onto the points as a camera would see it (perspective-n-point): the rotation and the place at
 which its points, weighted by how well each is known, are nearest to those of the picture. Mouth and chin move, and
-are left out. That makes faces look too much ahead, for nobody has the average face, and who finds the points draws
-them towards it; the points with their depths, as from far away, make another mistake. So yaw and pitch are mended by
-what both ways tell, as far as that has held for people who were not among those from whom the face was learned. What
-is left over then, by how far a head is turned, is the spread.
+are left out. Nobody has the average face, and who finds the points draws them towards the usual one, so a face that
+is laid onto them is beside the truth, most in pitch. By how much can be told from what is left over: how far each
+point, and its depth, is beside that of the face. So yaw and pitch are mended by that, as it was in rendered people.
+What is wrong even then of those among them from whom it was not learned, by how far a head is turned, is the spread.
 
 The face, what mends it and the spread are in `average_face.npz`, which `python -m tests.perception.eyes.learning`
 makes from rendered people.
@@ -29,6 +29,8 @@ SMALLEST = 8
 """Pixels that a face has to be wide and high."""
 LEARNED: Radians = 0.8
 """Angle from the line of sight up to which the mending was learned."""
+MOST_BESIDE = 30.0
+"""Millimetres by which a point is beside that of the face at most: hardly one of 1000 is."""
 LEAST_SPREAD, MOST_SPREAD = 0.01, pi / 4
 UPPER_LIP, LOWER_LIP, FOREHEAD, CHIN = 13, 14, 10, 152
 AHEAD = np.array([0.0, 0.0, -1.0])
@@ -37,7 +39,8 @@ AHEAD = np.array([0.0, 0.0, -1.0])
 
 class AverageFace(NamedTuple):
     """A face. points: in the axes of a camera that it faces, from between the eyes, metres. weights: of each point;
-    0: it moves. mends: coefficients of what is added to yaw and pitch. errors: of their standard deviations."""
+    0: it moves. mends: coefficients of what is added to yaw and pitch, by `LaidFace.signs`. errors: of their standard
+    deviations."""
 
     points: Floats
     weights: Floats
@@ -81,7 +84,7 @@ def head(
     laid = solved(points, width, height, focal, face)
     if laid is None:
         return None
-    yaw, pitch = laid.angles + face.mends @ laid.ways
+    yaw, pitch = laid.angles + face.mends @ laid.signs
     gap = float(np.linalg.norm(points[UPPER_LIP] - points[LOWER_LIP]))
     tall = float(np.linalg.norm(points[FOREHEAD] - points[CHIN]))
     spread = np.clip(face.errors @ laid.features, LEAST_SPREAD, MOST_SPREAD).tolist()
@@ -91,13 +94,14 @@ def head(
 class LaidFace(NamedTuple):
     """A face on the points of a picture. place: of the head. angles: yaw and pitch.
 
-    ways: what mends these: both ways to them, from the line of sight, and their squares. features: what their error
-    depends on: nothing, and how far the head is turned from the line of sight.
+    signs: what mends these: angles from the line of sight, their squares, and how far each point is beside that of
+    the face, in the axes of the head, millimetres. features: what their error depends on: nothing, and how far the
+    head is turned from the line of sight.
     """
 
     place: Floats
     angles: Floats
-    ways: Floats
+    signs: Floats
     features: Floats
 
 
@@ -108,8 +112,8 @@ def solved(points: Floats, width: int, height: int, focal: float, face: AverageF
     seen = (points[used, :2] - [width / 2, height / 2]) / focal
     if np.ptp(seen, axis=0).min() < SMALLEST / focal:
         return None
-    rotation, place = _start(model, weights, seen, points[used, 2] / focal)
-    flat = rotation @ AHEAD
+    depth = points[used, 2] / focal
+    rotation, place = _start(model, weights, seen, depth)
     for _ in range(MOST_STEPS):
         turned = model @ rotation.T
         at = turned + place
@@ -121,12 +125,12 @@ def solved(points: Floats, width: int, height: int, focal: float, face: AverageF
         if np.abs(step).max() < SMALL:
             break
     ahead = rotation @ AHEAD
-    sight, angles = np.array(yaw_pitch(-place)), np.array(yaw_pitch(ahead))
-    one, other = np.clip([angles - sight, np.array(yaw_pitch(flat)) - sight], -LEARNED, LEARNED)
-    (a, b), (c, d) = one, other
-    ways = np.array([1.0, *one, *other, a * a, b * b, a * b, c * c, d * d, c * d, b * d])
-    beside = float(np.arccos(np.clip(-ahead @ place / np.linalg.norm(place), -1, 1)))
-    return LaidFace(place, angles, ways, np.array([1.0, beside]))
+    angles = np.array(yaw_pitch(ahead))
+    a, b = np.clip(angles - yaw_pitch(-place), -LEARNED, LEARNED)
+    beside = _beside(model @ rotation.T, place, weights, seen, depth) @ rotation
+    signs = np.hstack([1.0, a, b, a * a, b * b, a * b, beside.ravel()])
+    turned_by = float(np.arccos(np.clip(-ahead @ place / np.linalg.norm(place), -1, 1)))
+    return LaidFace(place, angles, signs, np.array([1.0, turned_by]))
 
 
 def turn(by: Floats) -> Floats:
@@ -179,3 +183,15 @@ def _equations(turned: Floats, at: Floats, seen: Floats, weights: Floats) -> tup
     rows *= weights / at[:, 2]
     left = (seen.T - np.stack([u, v])) * weights
     return rows.reshape(6, -1).T, left.reshape(-1)
+
+
+def _beside(turned: Floats, place: Floats, weights: Floats, seen: Floats, depth: Floats) -> Floats:
+    """How far points are beside those of a face that was laid onto them, in camera axes, millimetres.
+
+    turned, place, seen: as above. depth: of each point from all of them, on that plane.
+    """
+    at = turned + place
+    flat = seen * at[:, 2:] - at[:, :2]
+    deep = depth * place[2] - turned[:, 2]
+    beside = np.column_stack([flat, deep - np.average(deep, weights=weights)]) * 1000
+    return np.asarray(np.clip(beside, -MOST_BESIDE, MOST_BESIDE))

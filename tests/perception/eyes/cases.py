@@ -21,12 +21,12 @@ class Case(NamedTuple):
     picture: Picture
 
 
-def cases(looks: Looks, number: int, chunk: int, count: int) -> Iterator[Case]:
-    """Draw somebody a number of times. number: of the person; both are seeds."""
+def cases(looks: Looks, number: int, chunk: int, count: int, fine: int = 2) -> Iterator[Case]:
+    """Draw somebody a number of times. number: of the person; both are seeds. fine: as in `drawn`."""
     person, chance = Person(looks), np.random.default_rng(number * 37 + chunk)
     for k in range(count):
         pose, light, noise, blur = _chosen(chance, k)
-        picture = drawn([(person, pose)], light, seed=number * 1000 + k)
+        picture = drawn([(person, pose)], light, seed=number * 1000 + k, fine=fine)
         yield Case(looks, pose, noisy(blurred(picture, blur), noise, k))
 
 

@@ -7,7 +7,7 @@ The mesh is MakeHuman's (CC0), with its targets for age, sex, origin and the for
 import gzip
 import sys
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 from typing import NamedTuple
 
@@ -43,18 +43,30 @@ class Looks(NamedTuple):
     is_long: bool = False
 
 
-FITTED = (
-    Looks("caucasian-male-young", 1, (0.80, 0.60, 0.50), (0.16, 0.10, 0.07)),
-    Looks("african-female-young", 2, (0.42, 0.28, 0.21), (0.05, 0.04, 0.04), True),
-    Looks("asian-female-young", 3, (0.82, 0.66, 0.54), (0.06, 0.05, 0.05), True),
-    Looks("caucasian-female-old", 4, (0.83, 0.66, 0.58), (0.55, 0.53, 0.50)),
-    Looks("asian-male-old", 5, (0.75, 0.58, 0.45), (0.30, 0.30, 0.30)),
-    Looks("african-male-young", 6, (0.34, 0.22, 0.16), (0.04, 0.03, 0.03)),
-    Looks("caucasian-female-young", 7, (0.86, 0.68, 0.60), (0.55, 0.38, 0.18), True),
-    Looks("african-female-old", 8, (0.48, 0.33, 0.25), (0.35, 0.34, 0.33)),
-    Looks("asian-male-young", 9, (0.78, 0.61, 0.48), (0.05, 0.05, 0.05)),
-    Looks("caucasian-male-old", 10, (0.82, 0.62, 0.54), (0.45, 0.44, 0.42)),
-)
+SKINS = {
+    "african": ((0.28, 0.18, 0.13), (0.52, 0.37, 0.28)),
+    "asian": ((0.70, 0.52, 0.40), (0.87, 0.73, 0.63)),
+    "caucasian": ((0.72, 0.52, 0.43), (0.88, 0.72, 0.65)),
+}
+"""Of each origin, the darkest and the palest."""
+HAIRS = {"young": ((0.04, 0.03, 0.03), (0.55, 0.38, 0.18)), "old": ((0.28, 0.27, 0.26), (0.72, 0.70, 0.68))}
+
+
+def crowd(seeds: Iterable[int]) -> tuple[Looks, ...]:
+    """Make up people of any kind, one of each seed."""
+    found = []
+    for seed in seeds:
+        chance = np.random.default_rng([seed, 257])
+        origin, sex, age = (str(chance.choice(of)) for of in ([*SKINS], ("female", "male"), [*HAIRS]))
+        skin, hair = (
+            tuple((np.array(dark) + chance.uniform() * np.subtract(pale, dark)).tolist())
+            for dark, pale in (SKINS[origin], HAIRS[age])
+        )
+        found.append(Looks(f"{origin}-{sex}-{age}", seed, skin, hair, sex == "female" and chance.uniform() < 0.5))
+    return tuple(found)
+
+
+FITTED = crowd(range(101, 161))
 """People of whom the code may learn."""
 JUDGED = (
     Looks("african-male-old", 21, (0.40, 0.27, 0.20), (0.30, 0.30, 0.29)),
@@ -319,13 +331,15 @@ def _lit(
     return np.asarray(color * (around + light.strength * falls)[:, None] + light.strength * shine[:, None])
 
 
-def drawn(people: Sequence[tuple[Person, Pose]], light: Light = DAY, lens: Lens = CAMERA, seed: int = 0) -> Picture:
-    """Draw people before a room, at twice the size and then scaled down. seed: of the room."""
-    fine = Lens(2 * lens.width, 2 * lens.height, 2 * lens.focal)
-    canvas, depth = _room(fine, seed), np.full((fine.height, fine.width), np.inf)
+def drawn(
+    people: Sequence[tuple[Person, Pose]], light: Light = DAY, lens: Lens = CAMERA, seed: int = 0, fine: int = 2
+) -> Picture:
+    """Draw people before a room, so many times finer and then scaled down. seed: of the room."""
+    large = Lens(fine * lens.width, fine * lens.height, fine * lens.focal)
+    canvas, depth = _room(large, seed), np.full((large.height, large.width), np.inf)
     for person, pose in people:
-        person.draw(pose, light, fine, canvas, depth)
-    small = canvas.reshape(lens.height, 2, lens.width, 2, 3).mean((1, 3))
+        person.draw(pose, light, large, canvas, depth)
+    small = np.asarray(sum(canvas[y::fine, x::fine] for y in range(fine) for x in range(fine))) / fine**2
     return np.asarray(np.clip(small, 0, 1) ** (1 / 1.3) * 255, np.uint8)
 
 

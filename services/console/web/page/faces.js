@@ -43,19 +43,19 @@ export function finder(detect, mesh, most) {
     found.push(face);
   }
 
-  // The square with the surest face, by the points that are found in one after the other; null: none is sure.
+  // The square of a new face: the mean of those that are sure, by how sure they are; null: none is. Each but the first is by the points that were found in the one before.
+  // All are sure to the last digit, so to take the surest would be chance, and another one than in litert.py.
   function refined(picture, crop) {
-    let best = null;
-    let surest = SURE;
     for (const first of [crop, { ...crop, angle: 0 }]) {
+      const tried = [];
       for (let each = first, n = 0; n < REFINED; n += 1) {
         const { points, confidence } = meshed(picture, each);
-        if (confidence >= surest) [best, surest] = [each, confidence];
+        tried.push([each, Math.max(confidence - SURE, 0)]);
         each = around(points);
       }
-      if (best) break;
+      if (tried.some(([, weight]) => weight)) return between(tried);
     }
-    return best;
+    return null;
   }
 
   // In the whole picture, and now and then in parts of it, in which who is far is larger: all of them, if nobody is known or near.
@@ -200,6 +200,14 @@ function around(points) {
   }
   const [x, y] = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2];
   return { x: c * x - s * y, y: s * x + c * y, side: Math.max(high[0] - low[0], high[1] - low[1]) * LARGER, angle };
+}
+
+// A square between several, by their weights.
+function between(crops) {
+  const total = crops.reduce((sum, [, weight]) => sum + weight, 0);
+  const mean = (part) => crops.reduce((sum, [crop, weight]) => sum + weight * part(crop), 0) / total;
+  const [x, y, side] = ["x", "y", "side"].map((part) => mean((crop) => crop[part]));
+  return { x, y, side, angle: Math.atan2(mean(({ angle }) => Math.sin(angle)), mean(({ angle }) => Math.cos(angle))) };
 }
 
 // Squares that cover a picture, each with a half of the next.

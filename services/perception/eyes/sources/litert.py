@@ -6,7 +6,7 @@ in 0..1 (mesh) or -1..1 (detector), a face upright in a square half as large aga
 the wheel of mediapipe 0.10.21 (`packages.py`).
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -101,21 +101,22 @@ class FaceFinder:
             found.append((points, confidence))
 
     def _refined(self, image: Image, crop: Crop) -> Crop | None:
-        """The square with the surest face, by the points that are found in one after the other; None: none is sure.
+        """The square of a new face: the mean of those that are sure, by how sure they are; None: none is.
 
-        The detector knows no more than the eyes, and of a head that is turned aside and down at once these lie askew.
+        Each but the first is by the points that were found in the one before: the detector knows no more than the
+        eyes, and of a head that is turned aside and down at once these lie askew. All are sure to the last digit, so
+        to take the surest would be chance, and another one in a page.
         """
-        best, surest = None, SURE
         for upright in (False, True):
             each = crop._replace(angle=0.0) if upright else crop
+            tried = list[tuple[Crop, float]]()
             for _ in range(REFINED):
                 points, confidence = self._meshed(image, each)
-                if confidence >= surest:
-                    best, surest = each, confidence
+                tried.append((each, max(confidence - SURE, 0.0)))
                 each = around(points)
-            if best is not None:
-                break
-        return best
+            if any(weight for _, weight in tried):
+                return _mean(tried)
+        return None
 
     def _sought(self, image: Image, *, is_alone: bool) -> Iterator[Crop]:
         """Look for faces: in the whole picture, and now and then in parts of it, in which who is far is larger.
@@ -205,6 +206,13 @@ def around(points: Floats) -> Crop:
     turned = points[:, :2] @ axes.T
     low, high = turned.min(0), turned.max(0)
     return Crop(axes.T @ ((low + high) / 2), float((high - low).max()) * LARGER, angle)
+
+
+def _mean(crops: Sequence[tuple[Crop, float]]) -> Crop:
+    """A square between several, by their weights."""
+    each = [[*crop.middle, crop.side, *crop.axes[0]] for crop, _ in crops]
+    x, y, side, across, down = np.average(each, axis=0, weights=[weight for _, weight in crops]).tolist()
+    return Crop(np.array([x, y]), side, float(np.arctan2(down, across)))
 
 
 def _parts(image: Image) -> Iterator[tuple[int, int, int]]:
