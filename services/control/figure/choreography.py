@@ -5,7 +5,7 @@ passes through no zero and a gesture that is not held is one fluid motion.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import radians
 
 from msgspec.structs import replace
@@ -85,10 +85,9 @@ def _planned(behavior: BlockBehavior, situation: Situation) -> Course:
         case Gaze():
             return replace(_glance(_gaze_aim(behavior, situation), situation), note=note_on(behavior))
         case GazeShift():
-            note = note_on(behavior, ("HEAD", "WAIST"))
-            if behavior.influence.upper() == "WAIST":
-                return replace(_turn(behavior, situation), note=note)
-            return replace(_shift(_gaze_aim(behavior, situation), situation), note=note)
+            turns = turns_trunk(behavior)
+            made = _turn(behavior, situation) if turns else _shift(_gaze_aim(behavior, situation), situation)
+            return replace(made, note=note_on(behavior))
         case HeadDirectionShift(target=target):
             return _shift(_neck_aim(target, 0.0, "", situation), situation)
         case Pointing(target=target, mode=mode):
@@ -195,16 +194,26 @@ def _turn(behavior: GazeShift, situation: Situation) -> Course:
     return course(("head", "torso"), joints, legs, points, goal + trunk, ray, aim=aim)
 
 
+def turns_trunk(behavior: BlockBehavior) -> bool:
+    """True for a shift of the head that turns the trunk."""
+    return isinstance(behavior, GazeShift) and behavior.influence.upper() == "WAIST"
+
+
+def with_head(behavior: BlockBehavior) -> BlockBehavior:
+    """The same behavior with the head alone, for once the trunk has turned."""
+    return replace(behavior, influence="") if isinstance(behavior, GazeShift) else behavior
+
+
 def _gaze_aim(behavior: Gaze | GazeShift, situation: Situation) -> Looked:
     return _neck_aim(behavior.target, behavior.offset_angle, behavior.offset_direction, situation)
 
 
-def note_on(look: Looks, influences: Sequence[str] = ("HEAD",)) -> str:
-    """Note what a neck does otherwise than a look asks. influences: those of a gaze that the body has."""
+def note_on(look: Looks) -> str:
+    """Note what a neck on a trunk that turns does otherwise than a look asks."""
     if isinstance(look, HeadDirectionShift):
         return ""
     notes = []
-    if look.influence.upper() not in ("", *influences):
+    if look.influence.upper() not in ("", "HEAD") and not turns_trunk(look):
         notes.append(f"this body has no influence {look.influence!r} of a gaze; it turns the 'HEAD', the nearest")
     if look.offset_angle and normal(look.offset_direction) not in OFFSETS:
         asked = f"offsetDirection {look.offset_direction!r}"

@@ -42,8 +42,7 @@ class Fixation:
         return choreography.eye_target(self.base)
 
     def shift(self, behavior: BlockBehavior, course: Course) -> None:
-        # Once the trunk has turned, the head follows by itself.
-        self.base = replace(behavior, influence="") if isinstance(behavior, GazeShift) else behavior
+        self.base = choreography.with_head(behavior)
         self.angles, self.aim = _target(course.on_target), course.aim
 
     def stay(self, angles: tuple[float, ...]) -> None:
