@@ -173,7 +173,7 @@ def _turn(behavior: GazeShift, situation: Situation) -> Course:
     """Course of a shift with the trunk: the eyes arrive as soon as without it, and stay while it turns."""
     towards = kinematics.turn_towards(entity_of(behavior.target, situation.world).position)
     before = situation.trunk or angles(TRUNK, situation.pose)
-    trunk = (towards, situation.rest["torso_lean"])
+    trunk: tuple[float, ...] = (towards, situation.rest["torso_lean"])
     carried = replace(situation, pose={**situation.pose, **dict(zip(TRUNK, trunk, strict=True))}, trunk=before)
     aim, goal = _gaze_aim(behavior, carried)
     joints, here = (*aim.joints, *TRUNK), carried.start(aim)
