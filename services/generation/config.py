@@ -66,7 +66,8 @@ class GenerationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     policies_off: tuple[str, ...] = ()
     """Names of policies that the robot does not follow. Of the head: "glance", "aversion" (it looks away from faces),
     "response", "mutual" (it keeps eyes that it has met), "listening" (it looks at who speaks), "hands", "face",
-    "continuers" (it says "mm-hmm" to who speaks for long), "nods". Of turns: "leaving" (a turn ends when its
+    "continuers" (it says "mm-hmm" to who speaks for long), "nods", "trunk" (it turns its trunk towards whom it speaks
+    with). Of turns: "leaving" (a turn ends when its
     addressees have gone), "silence" (when its client sends no more), "interruption", "next-speaker" (to whom of
     several it gives the turn). Or one of an installed package."""
     continuers: tuple[str, ...] = ("mm-hmm", "uh-huh")

@@ -394,7 +394,7 @@ class Fragments:
             bars = barred(targets(fragment), seen, performance.known, performance.barred)
             body = self._body.capabilities
             if body is not None:
-                self._arbiter.gaze_perceived_within(body.gaze_half_angle)
+                self._arbiter.has_body(body)
             rests = NO_CONTINUATION if followed else self._arbiter.rest(self._now)
             before = reduce(Continuation.then, (each.continuation for each in followed), rests)
             heard, permitted, config = self._heard_in(turn), permits(), self._config

@@ -6,6 +6,7 @@ from functools import partial
 
 from msgspec.structs import replace
 
+from engage_hri.services.control.bases.composed import Member, composed
 from engage_hri.services.control.config import Displaced, Slow, Stall, Variability
 from engage_hri.services.control.contract.body import Body, BodyState
 from engage_hri.services.control.testing import BodyContract, played
@@ -77,10 +78,6 @@ class Arms(Partial):
     parts, types = ("left_arm", "right_arm"), ("pointing", "gesture")
 
 
-class HeadAlone(Partial):
-    parts, types = ("head", "face"), ("gaze", "gazeShift", "head", "faceLexeme")
-
-
 class TestVoice(BodyContract):
     seeds = trials()
 
@@ -99,4 +96,4 @@ class TestHeadAlone(BodyContract):
     seeds = trials()
 
     def make(self) -> Body:
-        return HeadAlone()
+        return composed([Member("head", SimulatedBody(), ("head", "face"))])

@@ -48,6 +48,7 @@ POINTED = 0.02
 AIMED: tuple[Callable[[str, Random], BlockBehavior], ...] = (
     lambda id, chance: Gaze(id=id, target=chance.choice(TARGETS)),
     lambda id, chance: GazeShift(id=id, target=chance.choice(TARGETS)),
+    lambda id, chance: GazeShift(id=id, target=chance.choice(TARGETS), influence="WAIST"),
     lambda id, chance: HeadDirectionShift(id=id, target=chance.choice(TARGETS)),
     lambda id, chance: Pointing(id=id, target=chance.choice(TARGETS[1:]), mode=chance.choice(HANDS)),
 )

@@ -46,6 +46,7 @@ from engage_hri.services.control.figure.course import (
     arm_time,
     course,
     marks,
+    moving_time,
     return_time,
     turning_time,
 )
@@ -84,7 +85,9 @@ def _planned(behavior: BlockBehavior, situation: Situation) -> Course:
         case Gaze():
             return replace(_glance(_gaze_aim(behavior, situation), situation), note=note_on(behavior))
         case GazeShift():
-            return replace(_shift(_gaze_aim(behavior, situation), situation), note=note_on(behavior))
+            turns = turns_trunk(behavior)
+            made = _turn(behavior, situation) if turns else _shift(_gaze_aim(behavior, situation), situation)
+            return replace(made, note=note_on(behavior))
         case HeadDirectionShift(target=target):
             return _shift(_neck_aim(target, 0.0, "", situation), situation)
         case Pointing(target=target, mode=mode):
@@ -166,16 +169,51 @@ def _shift(looked: Looked, situation: Situation) -> Course:
     return course(("head",), joints, legs, (WalkPoint("start"), WalkPoint("end")), goal, ray, aim=aim)
 
 
+def _turn(behavior: GazeShift, situation: Situation) -> Course:
+    """Course of a shift with the trunk: the eyes arrive as soon as without it, and stay while it turns."""
+    towards = kinematics.turn_towards(entity_of(behavior.target, situation.world).position)
+    before = situation.trunk or angles(TRUNK, situation.pose)
+    trunk: tuple[float, ...] = (towards, situation.rest["torso_lean"])
+    carried = replace(situation, pose={**situation.pose, **dict(zip(TRUNK, trunk, strict=True))}, trunk=before)
+    aim, goal = _gaze_aim(behavior, carried)
+    joints, here = (*aim.joints, *TRUNK), carried.start(aim)
+    turning, looking = moving_time(TRUNK, before, trunk), turning_time(here, goal)
+    goal, trunk = goal if looking else here, trunk if turning else before
+    seconds = max(turning, looking)
+    share = looking / seconds if seconds else 1.0
+    # The trunk speeds up and slows down once, wherever on its way the eyes arrive.
+    way, speed = share**2 * (3.0 - 2.0 * share), 6.0 * share * (1.0 - share) / (seconds or 1.0)
+    under_way = tuple(a + way * (b - a) for a, b in zip(before, trunk, strict=True))
+    velocity = tuple(speed * (b - a) for a, b in zip(before, trunk, strict=True))
+    legs = (
+        Leg(goal=goal + under_way, velocity=(0.0, 0.0, *velocity), seconds=looking, marks=(("start", 0.0),)),
+        Leg(goal=goal + trunk, seconds=seconds - looking, marks=(("end", 1.0),)),
+    )
+    ray = kinematics.gaze({**carried.pose, **dict(zip(aim.joints, goal, strict=True))})
+    points = (WalkPoint("start"), WalkPoint("end"))
+    return course(("head", "torso"), joints, legs, points, goal + trunk, ray, aim=aim)
+
+
+def turns_trunk(behavior: BlockBehavior) -> bool:
+    """True for a shift of the head that turns the trunk."""
+    return isinstance(behavior, GazeShift) and behavior.influence.upper() == "WAIST"
+
+
+def with_head(behavior: BlockBehavior) -> BlockBehavior:
+    """The same behavior with the head alone, for once the trunk has turned."""
+    return replace(behavior, influence="") if isinstance(behavior, GazeShift) else behavior
+
+
 def _gaze_aim(behavior: Gaze | GazeShift, situation: Situation) -> Looked:
     return _neck_aim(behavior.target, behavior.offset_angle, behavior.offset_direction, situation)
 
 
 def note_on(look: Looks) -> str:
-    """Note what a neck does otherwise than a look asks."""
+    """Note what a neck on a trunk that turns does otherwise than a look asks."""
     if isinstance(look, HeadDirectionShift):
         return ""
     notes = []
-    if look.influence.upper() not in ("", "HEAD"):
+    if look.influence.upper() not in ("", "HEAD") and not turns_trunk(look):
         notes.append(f"this body has no influence {look.influence!r} of a gaze; it turns the 'HEAD', the nearest")
     if look.offset_angle and normal(look.offset_direction) not in OFFSETS:
         asked = f"offsetDirection {look.offset_direction!r}"

@@ -122,9 +122,15 @@ class Course(MotionPlan, frozen=True, kw_only=True):
     is_resizable: bool = False
     """True if it may be made smaller for want of time; false for a motion with a target."""
     aim: Aim | None = None
-    """The place that it is on from its beginning until it leaves its target: the trunk may move meanwhile."""
+    """The place that its first part is on from its beginning until it leaves its target: the trunk may move
+    meanwhile."""
     trunks: tuple[Trunk, ...] = (UPRIGHT,)
     """Places where the trunk may be while arms move along it. A course that moves the trunk itself needs none."""
+
+    @property
+    def turns_trunk(self) -> bool:
+        """True if it turns the trunk under a head that is on a place: the path of the head is laid for the end."""
+        return self.aim is not None and TRUNK[0] in self.joints
 
 
 class Situation(Struct, frozen=True):
@@ -147,11 +153,8 @@ class Situation(Struct, frozen=True):
     def start(self, aim: Aim) -> tuple[float, ...]:
         """Angles from which the path of a part begins that is going to be on a place."""
         here = angles(aim.joints, self.pose)
-        return (
-            here
-            if self.trunk is None or aim.is_laid_for(self.trunk)
-            else tuple(np.subtract(here, aim.offset(self.trunk)).tolist())
-        )
+        trunk = self.trunk or angles(TRUNK, self.pose)
+        return here if aim.is_laid_for(trunk) else tuple(np.subtract(here, aim.offset(trunk)).tolist())
 
 
 def course(

@@ -152,7 +152,7 @@ def motion_estimate(
 
 
 def is_gaze(course: Course) -> bool:
-    return course.parts == ("head",)
+    return course.parts[0] == "head"
 
 
 def is_arm(course: Course) -> bool:

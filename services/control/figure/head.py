@@ -7,6 +7,7 @@ from math import inf, radians
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, HeadDirectionShift
+from engage_hri.schemas.body import JointLimit
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.control.contract.refusals import Impossible
 from engage_hri.services.control.figure import choreography, tracks
@@ -14,7 +15,8 @@ from engage_hri.services.control.figure.course import NECK, Aim, Course, Situati
 from engage_hri.services.control.figure.runs import Run
 from engage_hri.services.control.figure.table_clearance import SHORTEST
 from engage_hri.services.control.figure.tracks import PartTrack
-from engage_hri.services.control.motion.path import Leg, Path
+from engage_hri.services.control.motion.motion import is_shift
+from engage_hri.services.control.motion.path import JointMotion, Leg, Path
 
 NOTICEABLE = radians(0.5)
 """Radians: a target that moves less does not move the head."""
@@ -40,7 +42,8 @@ class Fixation:
         return choreography.eye_target(self.base)
 
     def shift(self, behavior: BlockBehavior, course: Course) -> None:
-        self.base, self.angles, self.aim = behavior, course.legs[-1].goal, course.aim
+        self.base = choreography.with_head(behavior)
+        self.angles, self.aim = _target(course.on_target), course.aim
 
     def stay(self, angles: tuple[float, ...]) -> None:
         """Make a direction the base gaze, without an entity."""
@@ -90,17 +93,20 @@ def way_back(here: tuple[float, ...], base: tuple[float, ...]) -> Leg:
     return Leg(goal=base if seconds else here, seconds=seconds, marks=(("end", 1.0),))
 
 
-def retargeted(run: Run, course: Course, track: PartTrack, now: Seconds) -> Path | None:
+def retargeted(
+    run: Run, course: Course, start: JointMotion, limits: tuple[JointLimit, ...], now: Seconds
+) -> Path | None:
     """Path for the rest of a gaze or shift, on its way or on its target, that has moved; None: not noticeably.
 
-    course: to where the target is now.
+    course: to where the target is now. start, limits: of its path.
     """
     if not differ(_target(course.on_target), going_to(run.course, course)):
         return None
-    start = track.start_at(now, course.aim)
-    seconds = turning_time(start.q.tolist(), course.legs[0].goal) if run.holding else _left(run, now)
-    legs = (replace(course.legs[0], seconds=max(seconds, SHORTEST)), *course.legs[1:])
-    return Path(start, legs, track.limits(now, course.aim))
+    left = run.motion.path.after(run.motion.s(now))
+    # Of a shift whose trunk still turns, the eyes have arrived.
+    legs = course.legs[-1:] if is_shift(run.behavior) and len(left) == 1 else course.legs
+    seconds = turning_time(start.q.tolist(), legs[0].goal) if run.holding else _left(run, now)
+    return Path(start, (replace(legs[0], seconds=max(seconds, SHORTEST)), *legs[1:]), limits)
 
 
 def homeward(run: Run, base: tuple[float, ...], track: PartTrack, now: Seconds, aim: Aim | None) -> Path | None:

@@ -44,6 +44,8 @@ HAND_TO_TARGET: Meters = 0.06
 """Least distance from the hand to the surface of a target: pointing is not touching. Physics: `mujoco/limbs.py`."""
 NOD_RESERVE: Radians = radians(18.0)
 """Part of the neck's range that gaze keeps free, so that a nod finds room anywhere."""
+TURN_RESERVE: Radians = radians(3.0)
+"""Part of the torso's range that a turn towards something keeps free, for motors that go a little beyond."""
 _PITCHES: tuple[Radians, ...] = tuple(radians(degrees) for degrees in range(20, -32, -2))
 """Pitches of the shoulder at which a pointing is tried, the most extended arm first."""
 SLIDE: Radians = radians(2.0)
@@ -197,6 +199,13 @@ def look_at(target: Vector, pose: Pose, reserve: Radians = 0.0) -> tuple[float, 
         if not LIMIT[joint].low + reserve <= angle <= LIMIT[joint].high - reserve:
             raise Unreachable(f"{joint} cannot turn to {math.degrees(angle):.0f} degrees")
     return angles
+
+
+def turn_towards(target: Vector) -> Radians:
+    """Turn of the torso whose front is towards `target`, or as near as it comes."""
+    limit = LIMIT["torso_turn"]
+    turn = atan2(target[1] - HIP[1], target[0] - HIP[0])
+    return min(max(turn, limit.low + TURN_RESERVE), limit.high - TURN_RESERVE)
 
 
 def neck_angles(target: Vector, pose: Pose) -> tuple[float, float]:

@@ -7,6 +7,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from math import degrees, inf, radians
 
+import numpy as np
 from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Gaze, Pointing
@@ -80,7 +81,7 @@ class Torso(ClearOfTable):
         only: str = "",
     ) -> Estimate:  # fmt: skip
         """Estimate a movement along a path that was laid for it. moving: it begins now, from where its parts are."""
-        added = self._added(course) if moving else None
+        added = self._added(course, path) if moving or course.turns_trunk else None
         estimate = motion_estimate(behavior, course, path, situation.pose, added, only)
         leaves = next((point.sync for point in course.points if is_last_on_target(behavior, point.sync)), "")
         if added is None or not leaves or only:
@@ -90,12 +91,15 @@ class Torso(ClearOfTable):
         back = self.way_home(run, Motion(path, now), now + path.marks[leaves])
         return estimate if back is None else going_home(estimate, leaves, back)
 
-    def _added(self, course: Course) -> Added | None:
+    def _added(self, course: Course, path: Path) -> Added | None:
         """Tell what the trunk adds to a path that begins now; None: nothing."""
         now, aim, torso = self.clock.time(), course.aim, self.tracks["torso"]
-        if aim is None or torso.is_still(now, aim):
+        if aim is None:
             return None
-        return lambda seconds: aim.offset(torso.angles(now + seconds))
+        if course.turns_trunk:
+            count = len(aim.joints)
+            return lambda seconds: np.append(aim.offset(path.position(seconds)[count:]), np.zeros(len(TRUNK)))
+        return (lambda seconds: aim.offset(torso.angles(now + seconds))) if self.is_carried(course) else None
 
     def situation(self, world: World, pose: BodyPose | None = None, *, real: bool = False) -> Situation:
         """Describe what a course starts from. real: with the true joint angles, not those that the body believes."""
@@ -154,6 +158,7 @@ class Torso(ClearOfTable):
 
         is_free: for a trunk that moves, without the ranges of joints (`tracks.limits_of`); who asks minds the table.
         """
+        is_free |= course.turns_trunk
         path = Path(start, course.legs, tracks.limits_of(course.parts, is_free=is_free))
         # What is on a place is planned such that it is clear there wherever the trunk is; its way home is laid anew.
         trunks = course.trunks if course.aim is None else course.trunks[:1]
@@ -163,14 +168,23 @@ class Torso(ClearOfTable):
 
     def start(self, course: Course, situation: Situation | None = None) -> JointMotion:
         """State in which a path along `course` begins. situation: as for `path`."""
-        if situation is not None and course.parts != ("nod",):
-            return resting([situation.pose[joint] for joint in course.joints])
+        if situation is None or course.parts == ("nod",):
+            return self._states(course.parts, course.aim)
+        pose = dict(situation.pose)
+        if course.aim is not None:
+            pose |= zip(course.aim.joints, situation.start(course.aim), strict=True)
+        return resting([pose[joint] for joint in course.joints])
+
+    def _states(self, parts: Sequence[str], aim: Aim | None) -> JointMotion:
+        """State in which a path begins now whose first part has this aim."""
         now = self.clock.time()
-        return tracks.joined([self.tracks[part].start_at(now, course.aim) for part in course.parts])
+        return tracks.joined([self.tracks[part].start_at(now, aim if part == parts[0] else None) for part in parts])
 
     def is_carried(self, course: Course) -> bool:
-        """True if the trunk moves what goes along `course` to a target."""
-        return course.aim is not None and not self.tracks["torso"].is_still(self.clock.time(), course.aim)
+        """True if a trunk that it does not turn itself moves what goes along `course` to a target."""
+        if course.aim is None or course.turns_trunk:
+            return False
+        return not self.tracks["torso"].is_still(self.clock.time(), course.aim)
 
     def _path_on_the_move(self, start: JointMotion, course: Course) -> Path:
         """Lay a path to a target while the trunk moves: it arrives when the target is in reach. Raises Impossible."""
@@ -199,13 +213,19 @@ class Torso(ClearOfTable):
             self.misbelieved.pop(joint, None)
         left = self.take(run)
         if isinstance(run.behavior, choreography.SETTLING):
-            for track in (self.tracks[name] for name in run.course.parts):
-                track.base = tuple(run.course.on_target[joint] for joint in track.joints)
+            self._rest_there(run.course, run.course.parts)
+        elif run.course.turns_trunk:
+            self._rest_there(run.course, ("torso",))
         self.play(run, path, run.course.aim)
         self.relax(left)
         if "torso" in run.course.parts:
             self._wait_for_reach()
             yield from self.give_way()
+
+    def _rest_there(self, course: Course, parts: Collection[str]) -> None:
+        """Let parts go home to the target of a course from now on."""
+        for track in (self.tracks[name] for name in parts):
+            track.base = tuple(course.on_target[joint] for joint in track.joints)
 
     def play(self, run: Run, path: Path, aim: Aim | None) -> None:
         now, run.gate = self.clock.time(), inf
@@ -213,7 +233,7 @@ class Torso(ClearOfTable):
         run.play(Motion(path, now, cruise=run.cruise, limit=run.limit(path)))
         column = 0
         for part in run.course.parts:
-            self.tracks[part].play(run.motion, column, aim)
+            self.tracks[part].play(run.motion, column, aim if part == run.course.parts[0] else None)
             column += len(self.tracks[part].joints)
         self.attention.follow_run(run, now)
 
@@ -281,7 +301,7 @@ class Torso(ClearOfTable):
             goal, aim = self._home(run)
             is_homeward = any(is_last_on_target(run.behavior, sync) for sync in passed)
             aim = aim if is_homeward else run.course.aim
-            start = tracks.joined([self.tracks[part].start_at(now, aim) for part in run.course.parts])
+            start = self._states(run.course.parts, aim)
             legs = run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
             limits = self.limits(run, aim, now)
             path = self._path_home(run, start, goal, limits, now) if is_homeward else None
@@ -333,6 +353,8 @@ class Torso(ClearOfTable):
             track.play(Motion(Path(track.at(now), (leg,), tracks.LIMITS["head"]), now))
         track.aim = None
         self.attention.stay(goal)
+        if run.course.turns_trunk and run is self.runs.get("torso", run):
+            self.tracks["torso"].base = self.tracks["torso"].going()
 
     def relax(self, names: Collection[str]) -> None:
         now = self.clock.time()
@@ -383,8 +405,12 @@ class Torso(ClearOfTable):
         run.is_lost = False
         path: Path | None = None
         if run.holding or run.awaits("stroke") or is_shift(run.behavior):
-            path, aim = head.retargeted(run, course, track, now), course.aim
-            run.course = course if path is not None else run.course
+            aim = course.aim
+            start = self._states(course.parts, aim)
+            path = head.retargeted(run, course, start, self.limits(run, aim, now), now)
+            if path is not None:
+                run.course = course
+                self._rest_there(course, [part for part in course.parts if part == "torso"])
         elif not run.awaits("relax"):
             path = head.homeward(run, self.attention.angles, track, now, aim)
         if path is not None:

@@ -6,6 +6,7 @@ Only the nod tilts the head.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from math import radians
 
 import msgspec
@@ -150,11 +151,11 @@ def bases(tracks: Mapping[str, PartTrack]) -> dict[str, float]:
 
 
 def limits_of(parts: Sequence[str], *, is_free: bool = False) -> tuple[JointLimit, ...]:
-    """Limits of some parts. is_free: without their ranges, for a path to which a moving trunk adds its share."""
-    limits = tuple(limit for part in parts for limit in LIMITS[part])
-    if not is_free:
-        return limits
-    return tuple(msgspec.structs.replace(limit, low=-math.pi, high=math.pi) for limit in limits)
+    """Limits of some parts. is_free: the first without its ranges, for a path to which a trunk adds its share."""
+    first, *others = (LIMITS[part] for part in parts)
+    if is_free:
+        first = tuple(msgspec.structs.replace(limit, low=-math.pi, high=math.pi) for limit in first)
+    return tuple(chain(first, *others))
 
 
 def joined(states: Sequence[JointMotion]) -> JointMotion:

@@ -119,7 +119,17 @@ def _out(
     )  # fmt: skip
 
 
+def turned(behavior: BlockBehavior, now: Circumstances) -> tuple[Radians, Radians]:
+    """Turn and lean of the body once a behavior has begun: it goes where a shift turns it. Raises Impossible."""
+    turn, lean = now.tracks["torso"]
+    if choreography.turns_trunk(behavior):
+        turn, _ = look_at(behavior, joints.summed(now.tracks), now.world, now.mounting)
+        turn = joints.own_turn(turn)
+    return turn, lean
+
+
 def _look(look: Looks, now: Circumstances) -> Course:
+    now = replace(now, tracks={**now.tracks, "torso": turned(look, now)})
     yaw, pitch = look_at(look, joints.summed(now.tracks), now.world, now.mounting)
     goal = (yaw, pitch, joints.follow(yaw, now.tracks["torso"][0]))
     for limit, angle in zip(joints.TRACKS["head"], goal, strict=True):
@@ -130,7 +140,8 @@ def _look(look: Looks, now: Circumstances) -> Course:
             advice = "is control.drivers.reachy_mini.position where the robot stands?"
             raise Impossible("CANNOT_CREATE_BEHAVIOR", reason, advice)
     points = held_on_target("stroke") if isinstance(look, Gaze) else (WalkPoint("start"), WalkPoint("end"))
-    return _out("head", goal, now, points, choreography.note_on(look))
+    made = _out("head", goal, now, points, choreography.note_on(look))
+    return replace(made, parts=("head", "torso")) if choreography.turns_trunk(look) else made
 
 
 def _smaller(leg: Leg) -> Leg:

@@ -107,6 +107,11 @@ def of_track(track: str, pose: Angles, others: Mapping[str, tuple[float, ...]]) 
             return (pose["right_antenna"], pose["left_antenna"])
 
 
+def own_turn(yaw: float) -> float:
+    """Angle nearest to one that the body turns by itself, not after the head."""
+    return max(_TURN.low, min(_TURN.high, yaw))
+
+
 def follow(yaw: float, turn: float) -> float:
     """Angle by which the body turns after a head that looks there, with the body turned already."""
     beyond = max(0.0, abs(yaw - turn) - ASIDE)

@@ -10,6 +10,7 @@ from math import inf, radians
 
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace
 
 from engage_hri.schemas.behaviors import BlockBehavior, Looks
 from engage_hri.schemas.body import BodyPose, Estimate
@@ -21,6 +22,7 @@ from engage_hri.services.control.bases.moving_parts import Clock, MovingParts
 from engage_hri.services.control.bases.walk import Off, Watch, farthest, nearest, settling
 from engage_hri.services.control.contract.body import MovementAuthority
 from engage_hri.services.control.contract.refusals import Impossible
+from engage_hri.services.control.figure import choreography
 from engage_hri.services.control.figure.course import Course
 from engage_hri.services.control.figure.estimates import phases
 from engage_hri.services.control.figure.kinematics import Mounting
@@ -175,9 +177,16 @@ class Moves(MovingParts[Run]):
         tracks = {**self.planned(self.clock.time()), "torso": self.tracks["torso"].going(), "nod": joints.HOME["nod"]}
         if pose is not None:
             given = {**joints.summed(tracks), **{each.joint: each.angle for each in pose.joints}}
-            tracks["torso"] = (tracks["torso"][0], given["body_lean"])
+            tracks["torso"] = (self._turn_in(given, tracks["torso"][0]), given["body_lean"])
             tracks |= {name: joints.of_track(name, given, tracks) for name in ("head", "face")}
         return Circumstances(tracks, world, self.mounting)
+
+    @staticmethod
+    def _turn_in(pose: Angles, turn: Radians) -> Radians:
+        """The body's own turn in a pose: that which it has, if the head takes the body along to there."""
+        if abs(turn + joints.follow(pose["head_yaw"], turn) - pose["body_yaw"]) < NOTICEABLE:
+            return turn
+        return joints.own_turn(pose["body_yaw"])
 
     def estimate(self, behavior: BlockBehavior, around: Circumstances, *, is_resting: bool) -> Estimate:
         """Estimate a behavior that begins now, or from rest in these circumstances. Raises Impossible."""
@@ -185,20 +194,26 @@ class Moves(MovingParts[Run]):
         name, lag, goal = course.parts[0], self._settings.lag, course.goal
         track = self.tracks[name]
         start = resting(here[name]) if is_resting else self._start(track, behavior)
-        path = Path(start, course.legs, track.own_limits)
+        trunk, legs = courses.turned(behavior, around), course.legs
+        if choreography.turns_trunk(behavior):
+            from_there = resting(here["torso"]) if is_resting else self.tracks["torso"].at(self.clock.time())
+            legs = _as_long_as(self.way("torso", from_there, trunk).length, legs)
+        path = Path(start, legs, track.own_limits)
         near = [NEAR[each] for each in track.joints]
         times = {sync: s + settling(path, s, lag, near, FRAME) for sync, s in path.marks.items()}
         if "end" not in times:
             back = self.way(name, resting(goal), track.base)
             times["end"] = times["relax"] + back.length + settling(back, back.length, lag, near, FRAME)
-        after = {**here, name: here[name] if name == "nod" else goal}
+        after = {**here, "torso": trunk, name: here[name] if name == "nod" else goal}
         if name == "torso":  # the head keeps looking where it does; the body turns under it
             after["head"] = (*here["head"][:2], joints.follow(here["head"][0], goal[0]))
         end = after if course.stays or name == "nod" else {**here, name: track.base}
-        turned = sum(abs(b - a) for a, b in zip(here[name][:2], goal[:2], strict=True))
+        looks = [(here[each], after[each]) for each in course.parts] if name == "head" else []
+        turned = sum(abs(b - a) for one, other in looks for a, b in zip(one[:2], other[:2], strict=True))
         return Estimate(
-            behavior=behavior.id, feasible=True, degraded=course.note, parts=(track.part,),
-            phases=phases(course.points, times), head_degrees=math.degrees(turned) if name == "head" else 0.0,
+            behavior=behavior.id, feasible=True, degraded=course.note,
+            parts=tuple(self.tracks[each].part for each in course.parts), phases=phases(course.points, times),
+            head_degrees=math.degrees(turned),
             ray=joints.gaze(joints.summed(after), self.mounting) if name == "head" else None,
             pose_after=joints.message(after), pose_end=joints.message(end),
         )  # fmt: skip
@@ -220,8 +235,12 @@ class Moves(MovingParts[Run]):
     def take_over(self, run: Run) -> None:
         if not self.runs and self._is_astray(self.clock.time()):
             self.settle()
-        track = self.tracks[run.track]
-        path = Path(self._start(track, run.behavior), run.course.legs, track.own_limits)
+        track, legs = self.tracks[run.track], run.course.legs
+        if choreography.turns_trunk(run.behavior):
+            self.tracks["torso"].base = courses.turned(run.behavior, self.circumstances(self.world))
+            self.relax(("torso",))
+            legs = _as_long_as(self.tracks["torso"].motion.end - self.clock.time(), legs)
+        path = Path(self._start(track, run.behavior), legs, track.own_limits)
         self.take(run)
         if run.course.stays:
             track.base = run.course.goal
@@ -251,6 +270,8 @@ class Moves(MovingParts[Run]):
         if run.is_homeward and self.owns(run):
             aim = self._aim(self.look) if run.track == "head" else None
             self._play(run, self.way(run.track, track.start_at(now, aim), track.base, ("end", 1.0)), aim)
+            if run.track == "torso":
+                self.follow()
         elif has_waited and run.is_swing and self.owns(run):
             left = run.motion.path.after(run.motion.s(now), [point.sync for point in run.pending])
             self._play(run, Path(resting(run.motion.at(now).q), left, track.own_limits))
@@ -261,6 +282,9 @@ class Moves(MovingParts[Run]):
         if is_shift(run.behavior):
             run.motion.brake(self.clock.time())
             self.look, track.base = None, track.going()
+            if choreography.turns_trunk(run.behavior):
+                self.tracks["torso"].motion.brake(self.clock.time())
+                self.tracks["torso"].base = self.tracks["torso"].going()
             return
         if run.course.stays:
             self.rebase((run.track,))
@@ -279,7 +303,7 @@ class Moves(MovingParts[Run]):
                 self.follow()
 
     def rest_on(self, run: Run | None) -> None:
-        self.look = None if run is None else run.behavior
+        self.look = None if run is None else choreography.with_head(run.behavior)
         if run is not None:
             self.tracks["head"].base = run.course.goal
 
@@ -311,7 +335,8 @@ class Moves(MovingParts[Run]):
         goal: tuple[float, ...] = track.base
         if run is not None and not run.is_homeward:
             try:
-                goal, look, arrival = courses.course(run.behavior, around).goal, run.behavior, run.course.arrival
+                look, arrival = choreography.with_head(run.behavior), run.course.arrival
+                goal = courses.course(look, around).goal
             except Impossible:
                 return
         aim, now = self._aim(look), self.clock.time()
@@ -345,7 +370,9 @@ class Moves(MovingParts[Run]):
         A look is on its target by the gaze axis: what counts are the angles that look there from where the eyes are.
         """
         if run.track == "head":
-            return self.off_target(self.look if run.is_homeward else run.behavior)
+            off = self.off_target(self.look if run.is_homeward else run.behavior)
+            trunk = [self.off("torso", self.tracks["torso"].going())] if "torso" in run.course.parts else []
+            return max([off, *trunk], key=lambda each: each.share)
         path = run.motion.path
         mark = path.marks[sync]
         s = min(run.motion.s(self.clock.time()), mark + BEHIND)  # later it may be where a stuck joint is
@@ -376,8 +403,7 @@ class Moves(MovingParts[Run]):
         """Begin anew from where the joints are measured, at rest. Where tracks go home to stays."""
         now, here = self.clock.time(), self.measured
         self.trim = self._error = np.zeros(2)
-        low, high = joints.TRACKS["torso"][0].low, joints.TRACKS["torso"][0].high
-        tracks = {**joints.HOME, "torso": (max(low, min(high, here["body_yaw"])), here["body_lean"])}
+        tracks = {**joints.HOME, "torso": (joints.own_turn(here["body_yaw"]), here["body_lean"])}
         tracks |= {name: joints.of_track(name, here, tracks) for name in ("head", "face")}
         for name, track in self.tracks.items():
             track.play(Motion(Path(resting(tracks[name]), (), track.own_limits), now))
@@ -400,3 +426,8 @@ class Moves(MovingParts[Run]):
                 self._play(run, path, track.aim, at)
             else:
                 track.play(Motion(path, at), aim=track.aim)
+
+
+def _as_long_as(seconds: Seconds, legs: Sequence[Leg]) -> tuple[Leg, ...]:
+    """The leg of a look that lasts as long as the body turns under it."""
+    return tuple(replace(leg, seconds=max(leg.seconds, seconds)) for leg in legs)

@@ -70,6 +70,7 @@ WORLD = World(
 BEHAVIORS: tuple[BlockBehavior, ...] = (
     Gaze(id="gaze", target="near-right"),
     GazeShift(id="gazeShift", target="far-left"),
+    GazeShift(id="turn", target="far-left", influence="WAIST"),
     HeadDirectionShift(id="headDirectionShift", target="near-right"),
     Pointing(id="pointing", target="far-left"),
     Gesture(id="gesture", lexeme="BEAT"),

@@ -17,8 +17,18 @@ from math import inf
 
 from msgspec import Struct
 
-from engage_hri.schemas.behaviors import After, Constraint, Event, GazeShift, Head, Speech, Timing
+from engage_hri.schemas.behaviors import (
+    After,
+    Constraint,
+    Event,
+    GazeShift,
+    Head,
+    PostureShift,
+    Speech,
+    Timing,
+)
 from engage_hri.schemas.blocks import Block
+from engage_hri.schemas.body import Capabilities
 from engage_hri.schemas.documents.prosody import marked_up
 from engage_hri.schemas.fragments import Claim
 from engage_hri.schemas.recognition import Statistics
@@ -29,7 +39,7 @@ from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.followed import Followed, arranged, checked
 from engage_hri.services.generation.head.orders import FragmentPolicy, InhibitionPolicy
 from engage_hri.services.generation.head.policies import OWN
-from engage_hri.services.generation.head.policy import HeadPolicy, RobotSign
+from engage_hri.services.generation.head.policy import HeadPolicy, RobotSign, TrunkTurn
 from engage_hri.services.generation.head.scene import NOBODY, HeadScene, Observation
 from engage_hri.services.generation.inhibitions import Inhibition
 from engage_hri.services.generation.turns.continuation import Continuation
@@ -72,17 +82,20 @@ NOWHERE = Aim()
 class Shift(Struct, frozen=True):
     """An order to move the base gaze to `target`. glance: announce an optional mutual facial gaze with it.
 
-    beside: look past the target, to the upper right.
+    beside: look past the target, to the upper right. turn: with the trunk; of no target that turns back ahead.
     """
 
     id: str
     target: str
     glance: bool = False
     beside: bool = False
+    turn: bool = False
 
     @property
     def block(self) -> Block:
-        shift = GazeShift(id="shift", target=self.target)
+        if self.turn and not self.target:
+            return Block(id=self.id, behaviors=(PostureShift(id="shift"),))
+        shift = GazeShift(id="shift", target=self.target, influence="WAIST" if self.turn else "")
         if self.beside:
             shift = GazeShift(id="shift", target=self.target, offset_direction="UPRIGHT", offset_angle=UP_RIGHT)
         if not self.glance:
@@ -170,6 +183,8 @@ class Arbiter:
         """Target of the fragment's gaze that an inhibition with mode hold has found."""
         self._failed: tuple[Aim, Seconds] | None = None
         """Place that the last shift did not reach, and when to try it again."""
+        self._turning: tuple[str, Radians] | None = None
+        """The shift with which the trunk turns, and the direction to which it does."""
         self._shifts = self._signs = 0
 
     @property
@@ -187,9 +202,10 @@ class Arbiter:
         self._scene.feed(observation, now)
         self.policies.ask(lambda policy: policy.feed(observation, now))
 
-    def gaze_perceived_within(self, half_angle: Radians) -> None:
-        """Take the half angle of the body's gaze cone; one in the configuration goes before."""
-        self._scene.half_angle = self._config.gaze_half_angle or half_angle
+    def has_body(self, body: Capabilities) -> None:
+        """Take what the body can: its trunk, and its gaze cone, before which one in the configuration goes."""
+        self._scene.half_angle = self._config.gaze_half_angle or body.gaze_half_angle
+        self._scene.has_trunk = "torso" in body.parts
 
     def inhibit(self, inhibition: Inhibition | None) -> None:
         """Take the inhibition in force: that of the newest lease on gaze, if there is one."""
@@ -248,16 +264,20 @@ class Arbiter:
         is_beneath = self._owner.kind == FragmentPolicy.kind
         if id.rpartition("-")[2] == str(self._shifts) and self._rests_since is None and not is_beneath:
             self._rests_since = now
+        if self._turning is not None and self._turning[0] == id:
+            self._scene.facing, self._turning = self._turning[1], None
 
     def shift_failed(self, id: str, now: Seconds) -> None:
         """Note that shift `id` did not arrive: the same place is tried again after a pause, any other at once."""
         if id.rpartition("-")[2] == str(self._shifts):
             self._failed = self._base, now + RETRY
             self._base = NOWHERE
+        if self._turning is not None and self._turning[0] == id:
+            self._turning = None
 
     def body_lost(self) -> None:
-        """Forget where the base gaze is: another body may come, and look elsewhere."""
-        self._base = NOWHERE
+        """Forget where the base gaze and the trunk are: another body may come, and look elsewhere."""
+        self._base, self._turning, self._scene.facing = NOWHERE, None, 0.0
 
     def recognition_lost(self) -> None:
         """Drop what recognition told: the ends of its events and speeches will never come."""
@@ -304,7 +324,8 @@ class Arbiter:
         self.policies.ask(lambda policy: policy.has_head(owner.kind == policy.kind, now))
         self._waiting = tuple(claim for claim in claims if claim.kind != owner.kind)
         changed = owner != before or self._waiting != waited
-        return Ruling(owner, self._since, self._waiting, changed, self._shift(now), self._sign(now))
+        shift = self._shift(now) or self._turn(now)
+        return Ruling(owner, self._since, self._waiting, changed, shift, self._sign(now))
 
     def _note_rest(self, owner: Claim, now: Seconds) -> None:
         """Note that the eyes have come to rest on the target of `owner`, if they have."""
@@ -389,8 +410,26 @@ class Arbiter:
         cause = "response" if owner.kind == "response" else "maintenance"
         return Shift(f"{cause}-{self._shifts}", aim.target, glance=owner.kind == "glance", beside=aim.beside)
 
+    def _turn(self, now: Seconds) -> Shift | None:
+        """The shift with which the trunk turns, while the eyes rest where it turns to, or are on nobody."""
+        scene = self._scene
+        if self._is_ordered or self._turning is not None or self._failed is not None or not scene.has_trunk:
+            return None
+        turn = self.policies.first(lambda policy: checked("turn", policy.turn(now), TrunkTurn | None))
+        if turn is None or (turn.person and (self._rests_since is None or self._base != Aim(turn.person))):
+            return None
+        self._shifts += 1
+        shift = Shift(f"maintenance-{self._shifts}", turn.person, turn=True)
+        self._turning = shift.id, turn.direction
+        return shift
+
+    @property
+    def _is_ordered(self) -> bool:
+        """True while somebody's order has the head."""
+        return self._owner.kind in (InhibitionPolicy.kind, FragmentPolicy.kind)
+
     def _sign(self, now: Seconds) -> SignOrder | None:
-        if self._owner.kind in (InhibitionPolicy.kind, FragmentPolicy.kind) or self._scene.has_turn:
+        if self._is_ordered or self._scene.has_turn:
             return None
         sign = self.policies.first(lambda policy: checked("sign", policy.sign(now), RobotSign | None))
         if sign is None:

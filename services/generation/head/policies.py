@@ -11,6 +11,7 @@ from engage_hri.services.generation.head.nod_policy import NodPolicy
 from engage_hri.services.generation.head.orders import FragmentPolicy, InhibitionPolicy
 from engage_hri.services.generation.head.policy import HeadPolicy
 from engage_hri.services.generation.head.response_policy import ResponsePolicy
+from engage_hri.services.generation.head.trunk_policy import TrunkPolicy
 
 OWN: Mapping[str, type[HeadPolicy]] = {
     "inhibition": InhibitionPolicy,
@@ -24,6 +25,7 @@ OWN: Mapping[str, type[HeadPolicy]] = {
     "face": FaceWatch,
     "continuers": ContinuerPolicy,
     "nods": NodPolicy,
+    "trunk": TrunkPolicy,
 }
 ORDERS = "inhibition", "fragment"
 """Policies that cannot be switched off: somebody has ordered what they claim."""

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
 from engage_hri.schemas.fragments import Claim
-from engage_hri.schemas.units import Seconds
+from engage_hri.schemas.units import Radians, Seconds
 from engage_hri.services.generation.config import GenerationConfig
 from engage_hri.services.generation.head.scene import HeadScene, Observation
 
@@ -25,6 +25,13 @@ class RobotSign(NamedTuple):
 
     person: str
     words: str = ""
+
+
+class TrunkTurn(NamedTuple):
+    """A turn of the trunk. person: id of whom it is towards; "": back ahead. direction: radians to the left."""
+
+    person: str
+    direction: Radians
 
 
 class HeadPolicy:
@@ -63,6 +70,14 @@ class HeadPolicy:
 
         It is asked after the ruling, and neither while somebody's order holds the head nor in a turn of the robot.
         now: in seconds.
+        """
+        return None
+
+    def turn(self, now: Seconds) -> TrunkTurn | None:
+        """Return where the trunk is to turn now; None: it stays.
+
+        It is asked after the ruling, of a body that has a trunk, until the trunk has turned: the eyes have to rest on
+        that person, and nobody's order to have the head. now: in seconds.
         """
         return None
 

@@ -117,6 +117,10 @@ class HeadScene:
         """When each has been given the last sign of a listener."""
         self.words = 0.0
         """Number of words of the robot's fragment that was sent last."""
+        self.has_trunk = False
+        """True if it is known that the body has a part that turns beneath its head."""
+        self.facing: Radians = 0.0
+        """Direction to which the trunk has turned, to the left, whether it came all the way or not."""
         self.owner = NOBODY
         self.head_on = ""
         """The target that the head is on or on its way to."""

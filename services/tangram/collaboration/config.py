@@ -16,7 +16,7 @@ class CollaborationConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     mode: Literal["scripted", "task", "host"] = "scripted"
     placement: Seconds = 15.0
-    """Time that the person has to place a piece before the robot asks again."""
+    """Time that the person has to place a piece before the robot asks again. It stops while they hold one."""
 
     def __post_init__(self) -> None:
         not_negative(self, ("placement",), "collaboration.")

@@ -12,8 +12,10 @@ from itertools import accumulate
 from msgspec import Struct
 from msgspec.structs import replace
 
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorLost
 from engage_hri.schemas.units import Meters, Radians, Seconds
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.reports.ongoing_actions import ActionEvent
 
 MOVED: Meters = 0.015
 TURNED: Radians = math.radians(10.0)
@@ -47,6 +49,38 @@ AWAY: Seconds = 5.0
 """Time for which somebody must have been out of sight to have gone: who is seen again has come anew. Ours."""
 WINDOW: Seconds = 1.0
 """Age of the oldest frame that is judged."""
+
+
+LONGEST_HOLD: Seconds = 70.0
+"""Time for which a piece in a hand counts as being laid: a hand may rest on one. The longest time without any event
+in Table 2.1 of the thesis, when people were busy with what lay before them."""
+
+
+class HeldPieces:
+    """The time for which anybody has had a piece in their hand so far: while it runs, they are at what was asked."""
+
+    def __init__(self) -> None:
+        self._held: set[tuple[str, tuple[str, ...]]] = set()
+        self._since: Seconds = 0.0
+        self._before: Seconds = 0.0
+        """Seconds of the holds that are over."""
+
+    def feed(self, action: ActionEvent, now: Seconds) -> None:
+        """Take what somebody has begun to do or done."""
+        so_far, held = self.seconds(now), set(self._held)
+        match action:
+            case ActionBegan(actor=actor, action="act", targets=targets):
+                held.add((actor, targets))
+            case ActionEnded(actor=actor, action="act", targets=targets):
+                held.discard((actor, targets))
+            case ActorLost(actor=actor):
+                held = {each for each in held if each[0] != actor}
+        if held != self._held:
+            self._held, self._before, self._since = held, so_far, now
+
+    def seconds(self, now: Seconds) -> Seconds:
+        """Seconds until now."""
+        return self._before + (min(now - self._since, LONGEST_HOLD) if self._held else 0.0)
 
 
 class _View(Struct):

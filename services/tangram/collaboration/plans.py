@@ -79,7 +79,10 @@ class Observe(Struct, frozen=True):
 
 
 class AwaitPlacement(Struct, frozen=True):
-    """Wait until the piece has been moved from where it was `before`, and rests. Answer: True if it has."""
+    """Wait until the piece has been moved from where it was `before`, and rests. Answer: True if it has.
+
+    timeout: seconds without a piece in anybody's hand.
+    """
 
     piece: str
     before: tuple[Entity, ...]

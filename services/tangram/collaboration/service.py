@@ -20,7 +20,7 @@ from engage_hri.services.runtime.service import Ready, tell_settings
 from engage_hri.services.tangram.collaboration import plans
 from engage_hri.services.tangram.collaboration.config import CollaborationConfig
 from engage_hri.services.tangram.collaboration.host import host
-from engage_hri.services.tangram.collaboration.pieces_in_view import PiecesInView, has_been_placed
+from engage_hri.services.tangram.collaboration.pieces_in_view import HeldPieces, PiecesInView, has_been_placed
 from engage_hri.services.tangram.collaboration.plans import turns
 from engage_hri.services.tangram.table import tangram_table
 
@@ -39,12 +39,12 @@ async def collaborate(bus: Bus, ready: Ready, config: CollaborationConfig) -> No
     manager = plans.Manager(config, tangram_table())
     plan = plans.script(manager, turns(manager)) if config.mode == "scripted" else plans.task(manager)
     async with Robot.on(bus) as robot, asyncio.TaskGroup() as tasks:
-        engine = _Engine(robot, bus, PiecesInView())
+        engine = _Engine(robot, bus, PiecesInView(), HeldPieces())
         with robot.worlds() as worlds, robot.engagement() as levels, robot.actions() as actions:
             watching = [
                 tasks.create_task(engine.watch(worlds), name="watch the table"),
                 tasks.create_task(engine.attend(levels), name="watch the people"),
-                tasks.create_task(engine.follow_looks(actions), name="watch their eyes"),
+                tasks.create_task(engine.follow(actions), name="watch their eyes and hands"),
             ]
             tell_settings(bus, "collaboration", config)
             ready()
@@ -66,10 +66,11 @@ async def _follow(plan: plans.Plan[None], engine: "_Engine") -> None:
 class _Engine:
     """Grants the wishes of a plan, and watches the table all the while."""
 
-    def __init__(self, robot: Robot, bus: Bus, view: PiecesInView) -> None:
+    def __init__(self, robot: Robot, bus: Bus, view: PiecesInView, held: HeldPieces) -> None:
         self._robot = robot
         self._bus = bus
         self._view = view
+        self._held = held
         self._seen = asyncio.Event()
         self._levels: dict[str, EngagementLevel] = {}
         self._looks: dict[str, tuple[str, ...]] = {}
@@ -84,8 +85,9 @@ class _Engine:
         async for told in levels:
             self._levels[told.actor] = told.level
 
-    async def follow_looks(self, actions: Feed[ActionEvent]) -> None:
+    async def follow(self, actions: Feed[ActionEvent]) -> None:
         async for told in actions:
+            self._held.feed(told, self._robot.now())
             if isinstance(told, ActionBegan) and told.action == "look":
                 self._looks[told.actor] = told.targets
 
@@ -99,11 +101,14 @@ class _Engine:
                     self._bus.publish(keys.fault(self._bus.name), error.fault)
                     return None
             case plans.Observe(patience=patience):
-                await self._wait_until(view.is_steady, now + patience)
+                await self._wait_until(view.is_steady, lambda _: now + patience)
                 return view.pieces(self._robot.now())
             case plans.AwaitPlacement(piece=piece, before=before, timeout=timeout):
-                is_placed = partial(has_been_placed, piece, before)
-                return await self._wait_until(lambda at: is_placed(view.pieces(at)), now + timeout)
+                is_placed, end, held = partial(has_been_placed, piece, before), now + timeout, self._held
+                end -= held.seconds(now)
+                return await self._wait_until(
+                    lambda at: is_placed(view.pieces(at)), lambda at: end + held.seconds(at)
+                )
             case plans.LookAround():
                 table = {tangram_table().surface.id, *(piece.id for piece in view.pieces(now))}
                 return tuple(
@@ -116,18 +121,18 @@ class _Engine:
                     for id in view.people(now)
                 )
             case plans.AwaitPerson(known=known):
-                await self._wait_until(lambda at: view.person(at) is not None, math.inf)
+                await self._wait_until(lambda at: view.person(at) is not None, lambda _: math.inf)
                 return view.person(self._robot.now(), known)
             case plans.AwaitDeparture(timeout=timeout):
-                return await self._wait_until(lambda at: view.person(at) is None, now + timeout)
+                return await self._wait_until(lambda at: view.person(at) is None, lambda _: now + timeout)
             case plans.Pause(seconds=seconds):
                 await asyncio.sleep(seconds)
                 return None
 
-    async def _wait_until(self, holds: Callable[[Seconds], bool], deadline: Seconds) -> bool:
-        """Wait until `holds`, asked at loop time, is true of the table. False: it was not by `deadline`."""
+    async def _wait_until(self, holds: Callable[[Seconds], bool], ends: Callable[[Seconds], Seconds]) -> bool:
+        """Wait until `holds`, asked at loop time, is true of the table. False: it was not when the wait `ends`."""
         while not holds(now := self._robot.now()):
-            if now >= deadline:
+            if now >= (deadline := ends(now)):
                 return False
             change = self._view.deadline(now)
             again = deadline if change is None else min(change, deadline)

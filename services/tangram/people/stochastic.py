@@ -67,10 +67,11 @@ class Habits(Struct, frozen=True, kw_only=True):
     """Delay from the end of the turn to the answer. Table 2.1."""
     study: tuple[Seconds, Seconds, Seconds] = (4.0, 9.0, 60.0)
     """Time for which they study the pieces: the busy regime. Thesis 2.3 has it; the numbers are ours."""
-    hesitates: tuple[Seconds, Seconds, Seconds] = (0.2, 0.8, 3.0)
+    hesitates: tuple[Seconds, Seconds, Seconds] = (0.3, 2.0, 6.0)
     """Time for which they look at the piece before they reach for it. Ours, with the two that follow: sessions of the
-    thesis' participants take 345 s, with a standard deviation of 96 s."""
-    fits: tuple[Seconds, Seconds, Seconds] = (1.0, 7.0, 24.0)
+    thesis' participants take 345 s, with a standard deviation of 96 s, and of those of Table 2.1 somebody gives a
+    first turn each 12 s."""
+    fits: tuple[Seconds, Seconds, Seconds] = (1.0, 10.0, 30.0)
     """Time for which they turn it to and fro where it is to lie, until it fits. Ours."""
     pace: tuple[Seconds, Seconds, Seconds] = (0.5, 1.0, 2.5)
     """Factor on these two times and on those of study and search, drawn once for each person. Ours."""

@@ -110,6 +110,26 @@ async def test_the_body_turns_along_for_what_is_far_aside_and_comes_back(body: R
     assert angle(body, "body_yaw") == pytest.approx(0.0, abs=0.1)
 
 
+async def test_a_shift_of_the_waist_turns_the_body_which_stays_under_looks_of_the_head(body: ReachyMini):
+    aside_place = (1.0, 0.35, 1.0)
+    body.see(with_person(aside_place))
+    await performed(body, GazeShift(id="turn", target="human", influence="WAIST"))
+
+    assert off(body, aside_place) < ON_AXIS
+    assert angle(body, "body_yaw") == pytest.approx(19.3, abs=1.0)
+
+    look = Stage(body, Gaze(id="look", target="near-right"), "stroke_start")
+    await asyncio.sleep(2.0)
+
+    assert off(body, place("near-right")) < ON_AXIS
+    # The head takes it along no further than any look does.
+    assert angle(body, "body_yaw") == pytest.approx(angle(body, "head_yaw") + 30.0, abs=0.5)
+    look.authority.extend("end")
+    await look.over()
+    await asyncio.sleep(1.0)
+    assert angle(body, "body_yaw") == pytest.approx(19.3, abs=1.0)
+
+
 async def test_what_is_behind_it_or_under_its_chin_it_refuses_with_the_joint_and_its_range(body: ReachyMini):
     for position, joint in (((-1.0, 0.1, 1.0), "head_yaw"), ((0.2, 0.0, 0.7), "head_pitch")):
         world = with_person(position)

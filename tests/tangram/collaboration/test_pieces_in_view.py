@@ -8,9 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorLost
 from engage_hri.schemas.tables import Relation, relation
+from engage_hri.schemas.units import Stamp
 from engage_hri.schemas.world import Entity, World
-from engage_hri.services.tangram.collaboration.pieces_in_view import PiecesInView, has_been_placed
+from engage_hri.services.tangram.collaboration.pieces_in_view import (
+    LONGEST_HOLD,
+    HeldPieces,
+    PiecesInView,
+    has_been_placed,
+)
 from engage_hri.services.tangram.collaboration.task import Instruction, check
 from engage_hri.services.tangram.table import tangram_table
 
@@ -187,3 +194,39 @@ def test_the_person_who_is_known_counts_before_others_while_they_are_there() -> 
     view.see(World(entities=(ann,)), 2.0)
 
     assert (both, view.person(2.1, "ben"), view.person(2.6, "ben"), view.person(2.6)) == ("ben", "ben", "ann", "ann")
+
+
+def held(*told: tuple[float, ActionBegan | ActionEnded | ActorLost]) -> HeldPieces:
+    pieces = HeldPieces()
+    for at, action in told:
+        pieces.feed(action, at)
+    return pieces
+
+
+def takes(piece: str, actor: str = "ann") -> ActionBegan:
+    return ActionBegan(actor=actor, action="act", targets=(piece,), at=AT)
+
+
+def lays(piece: str, actor: str = "ann") -> ActionEnded:
+    return ActionEnded(actor=actor, action="act", targets=(piece,), at=AT)
+
+
+AT = Stamp("test", 0.0)
+
+
+def test_time_with_a_piece_in_a_hand_adds_up_and_looks_and_second_hands_do_not_count() -> None:
+    look = ActionBegan(actor="ann", action="look", targets=("b",), at=AT)
+    pieces = held(
+        (1.0, takes("a")), (2.0, look), (3.0, takes("b", "ben")), (4.0, lays("a")), (5.0, lays("b", "ben")),
+        (9.0, takes("a")),
+    )  # fmt: skip
+
+    assert [pieces.seconds(at) for at in (9.0, 10.5)] == [4.0, 5.5]
+
+
+def test_who_goes_with_a_piece_in_their_hand_holds_it_no_longer() -> None:
+    assert held((1.0, takes("a")), (3.0, ActorLost(actor="ann", at=AT))).seconds(60.0) == 2.0
+
+
+def test_a_hand_that_never_lets_go_counts_no_longer_than_people_do() -> None:
+    assert held((1.0, takes("a"))).seconds(1000.0) == LONGEST_HOLD

@@ -39,6 +39,16 @@ async def test_the_anchor_is_made_and_nothing_stays_open():
     assert left_open(record) == []
 
 
+async def test_who_has_a_piece_in_their_hand_is_not_asked_again_however_long_they_turn_it():
+    slow = Habits(
+        fits=(25.0, 30.0, 35.0), misplaces=0.0, confuses=0.0, confuses_shown=0.0, hears=1.0, answers_turn=1.0
+    )
+    record = await plays(1, habits=slow)
+
+    assert placed(record) == 10
+    assert times_asked_again(record) == 0
+
+
 async def test_words_alone_are_enough():
     record = await plays(0, "degraded-generation")
     shown = [it for it in record.messages(ActionBegan) if it.actor == "robot" and it.action in ("look", "point")]
