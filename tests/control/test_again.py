@@ -202,7 +202,7 @@ def each_behavior_ends_once(again: Again) -> None:
 
 async def test_all_that_can_happen_to_a_behavior_happens(hub: MemoryHub) -> None:
     """The sessions above would prove little if they were quiet."""
-    record = await recorded(hub, 1, lives=3)
+    record = await recorded(hub, 5, lives=3)
     steps, did, ends = Counter[str](), Counter[str](), Counter[str]()
     for session in record.lives:
         steps.update(each.content["type"] for taken in record.lives[session] for each in taken.steps if each.content)
