@@ -186,7 +186,7 @@ def _equations(turned: Floats, at: Floats, seen: Floats, weights: Floats) -> tup
 
 
 def _beside(turned: Floats, place: Floats, weights: Floats, seen: Floats, depth: Floats) -> Floats:
-    """How far points are beside those of a face that was laid onto them, in camera axes, millimetres.
+    """Distances of points from those of a face that was laid onto them, in camera axes, millimetres.
 
     turned, place, seen: as above. depth: of each point from all of them, on that plane.
     """
