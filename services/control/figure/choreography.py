@@ -7,6 +7,7 @@ passes through no zero and a gesture that is not held is one fluid motion.
 import math
 from collections.abc import Mapping
 from math import radians
+from typing import TypeGuard
 
 from msgspec.structs import replace
 
@@ -194,7 +195,7 @@ def _turn(behavior: GazeShift, situation: Situation) -> Course:
     return course(("head", "torso"), joints, legs, points, goal + trunk, ray, aim=aim)
 
 
-def turns_trunk(behavior: BlockBehavior) -> bool:
+def turns_trunk(behavior: BlockBehavior) -> TypeGuard[GazeShift]:
     """True for a shift of the head that turns the trunk."""
     return isinstance(behavior, GazeShift) and behavior.influence.upper() == "WAIST"
 

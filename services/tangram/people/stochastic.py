@@ -71,9 +71,9 @@ class Habits(Struct, frozen=True, kw_only=True):
     """Time for which they look at the piece before they reach for it. Ours, with the two that follow: sessions of the
     thesis' participants take 345 s, with a standard deviation of 96 s, and of those of Table 2.1 somebody gives a
     first turn each 12 s."""
-    fits: tuple[Seconds, Seconds, Seconds] = (1.0, 10.0, 30.0)
+    fits: tuple[Seconds, Seconds, Seconds] = (1.0, 12.0, 36.0)
     """Time for which they turn it to and fro where it is to lie, until it fits. Ours."""
-    pace: tuple[Seconds, Seconds, Seconds] = (0.5, 1.0, 2.5)
+    pace: tuple[Seconds, Seconds, Seconds] = (0.4, 1.0, 3.0)
     """Factor on these two times and on those of study and search, drawn once for each person. Ours."""
     busy_answers: Probability = 0.25
     """Factor on these three shares, and on what they do unasked, while they study or move pieces. Ours."""

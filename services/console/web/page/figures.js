@@ -361,7 +361,7 @@ export function makeRobot(scene) {
     upper: limb(scene, 0.038, SHELL), fore: limb(scene, 0.034, SHELL), hand: ball(scene, 0.038, JOINTS), finger: limb(scene, 0.011, JOINTS),
     ray: ray(scene, "#e0533f", true), from: follower(), to: follower(),
   }]));
-  const [eyes, gaze] = [follower(), follower()];
+  const [eyes, gaze, front] = [follower(), follower(), follower()];
   const heads = [trunk, base, neck.mesh, head.group];
   let [told, find] = [null, () => null];
   return {
@@ -377,6 +377,8 @@ export function makeRobot(scene) {
         gaze.to(body.gaze ? vector(body.gaze).normalize() : new THREE.Vector3(1, 0, 0));
         head.mimic(body.joints, body.speaking);
       }
+      const yaw = body?.joints?.torso_turn ?? body?.joints?.body_yaw ?? 0;
+      front.to(new THREE.Vector3(Math.cos(yaw), Math.sin(yaw), 0));
       for (const [side, arm] of arms) {
         const shown = body?.arms.find((each) => each.side === side);
         for (const part of [arm.shoulder, arm.elbow, arm.upper.mesh, arm.fore.mesh, arm.hand, arm.finger.mesh]) part.visible = Boolean(shown);
@@ -386,10 +388,12 @@ export function makeRobot(scene) {
       }
     },
     step(part) {
-      const moves = [eyes, gaze, ...[...arms.values()].flatMap((arm) => [arm.from, arm.to])].map((each) => each.step(part)).some(Boolean);
+      const moves = [eyes, gaze, front, ...[...arms.values()].flatMap((arm) => [arm.from, arm.to])].map((each) => each.step(part)).some(Boolean);
       const top = eyes.now;
       const shoulders = new THREE.Vector3(top.x - 0.05, top.y, top.z - 0.22);
       trunk.position.set(shoulders.x, shoulders.y, shoulders.z - 0.02);
+      trunk.rotation.z = Math.atan2(front.now.y, front.now.x);
+      const left = new THREE.Vector3(-front.now.y, front.now.x, 0).multiplyScalar(SHOULDERS - 0.03);
       base.position.set(0, 0, 0);
       base.scale.z = Math.max((shoulders.z - 0.4) / 0.53, 0.01);
       neck.between(shoulders, new THREE.Vector3(top.x - 0.08, top.y, top.z - 0.08));
@@ -410,7 +414,7 @@ export function makeRobot(scene) {
         }
         const way = arm.to.now.clone().sub(elbow).normalize();
         const wrist = arm.to.now.clone().addScaledVector(way, -0.06);
-        arm.shoulder.position.copy(shoulders).y += arm.sign * (SHOULDERS - 0.03);
+        arm.shoulder.position.copy(shoulders).addScaledVector(left, arm.sign);
         arm.elbow.position.copy(elbow);
         arm.upper.between(arm.shoulder.position, elbow);
         arm.fore.between(elbow, wrist.clone().addScaledVector(way, -0.02));
