@@ -141,7 +141,7 @@ def _reading(one: Into, timeline: Timeline) -> set[str]:
     is_long = speech.seconds > WORDS_WAIT + ROUND and wait < over  # it has been one that interrupts before
     is_of_answer = not is_long and turn.kind == "asks" and any(turn.until < each.until for each in beside)
     if is_of_answer and not one.is_beside and not outlasts:
-        decided = turn.until if turn.is_aborted else (wait, LAST)  # a cut decides at once
+        decided = turn.until if turn.is_aborted else max(turn.until, (wait, LAST))  # a cut decides at once
         return {"answer", by_words if known is not None and known <= decided else "noise"}
     if known is not None and (not outlasts or known < one.until):
         heard = max(wait, until + WORDS_AFTER) if one.is_beside else wait

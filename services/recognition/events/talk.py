@@ -225,7 +225,12 @@ class Talk(KindRecognizer):
             self._has_news(speech, at)
         known, over = speech.words, (at if speech.until is None else speech.until) + WORDS_AFTER
         is_in_time = at <= max(since + WORDS_WAIT, over if speech.is_beside else since) + ROUNDING
-        if speech.sound == "unsure" and says_words(known) and (is_in_time or not self._is_into_words(speech)):
+        # What the line holds may have ended the robot's turn, so that only the speech knows that it is not into that.
+        if (
+            speech.sound == "unsure"
+            and says_words(known)
+            and not ((speech.is_into_turn or speech.is_beside) and self._is_into_words(speech) and not is_in_time)
+        ):
             self._scene.decide(speech, at)
         # What has been waited for was known when the speech began. The line waits for no words of who is alone.
         if is_in_time and speech.company and any(each is speech for _, each in self._line):
@@ -480,12 +485,12 @@ class Talk(KindRecognizer):
         return self.speeches.likely(speech, at, frozenset((self._scene.robot,)) if waits else NOBODY)
 
     def may_go_on(self, now: Seconds) -> bool:
-        """True if it is decided before `now` to whom the first speech in line is, or if what is decided may be told.
+        """True if it is decided before `now` to whom the first speech in line is, or if what is known may be told.
 
         What is due in this very instant waits for all that happens in it: who is silent then has not gone on.
         """
-        if not self._line:
-            return False
+        if not self._line or self._conversation.deadline < self._line[0][0] - ROUNDING:
+            return bool(self._line)
         speech = self._undecided_first()
         return not self._is_behind_others() if speech is None else self._decided_at(speech) < now - ROUNDING
 
