@@ -213,7 +213,7 @@ class Fragments:
 
     def body_lost(self) -> None:
         """Forget the body: another one may come."""
-        self._body.capabilities = None
+        self._body.forget()
 
     def _follow(self, progress: SyncPointProgress, now: Seconds) -> None:
         """Pass a sync point to its fragment, and tell the arbiter of its gazes when they really happen."""
@@ -327,12 +327,19 @@ class Fragments:
         if (following := self._next()) is not None:
             following.has_begun = True
             self._ways.begin(self._perform(following))
+            if not targets(following.fragment):
+                self._ways.begin(self._meet_body())
             return True
         if self._is_choosing or (changed := next(filter(self._has_changed, self._live.values()), None)) is None:
             return False
         self._is_choosing = True
         self._ways.begin(self._choose_again(changed))
         return True
+
+    def _meet_body(self) -> Way:
+        """Get to know a body that no reference asks: policies of the head have to know what it can."""
+        if (body := (yield from self._body.described())) is not None:
+            self._arbiter.has_body(body)
 
     def _next(self) -> FragmentPerformance | None:
         """The first fragment in line, if its block may be sent now.
@@ -392,8 +399,7 @@ class Fragments:
             performance.warn(lost)
             check_world(fragment, world, self._robot)  # it may have changed while the fragment waited
             bars = barred(targets(fragment), seen, performance.known, performance.barred)
-            body = self._body.capabilities
-            if body is not None:
+            if (body := self._body.capabilities) is not None:
                 self._arbiter.has_body(body)
             rests = NO_CONTINUATION if followed else self._arbiter.rest(self._now)
             before = reduce(Continuation.then, (each.continuation for each in followed), rests)

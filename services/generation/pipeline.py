@@ -6,6 +6,7 @@ for ten references among a hundred objects takes 8 ms (decision 0262).
 """
 
 from collections.abc import Callable, Generator, Sequence
+from contextlib import suppress
 from typing import Any, TypeVar
 
 from msgspec.structs import replace
@@ -13,7 +14,7 @@ from msgspec.structs import replace
 from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import BlockBehavior, Hand, Reference
 from engage_hri.schemas.body import Capabilities, DescribeBody, Estimate, EstimateBehaviors, EstimateItem, Estimates
-from engage_hri.schemas.faults import Fault, RunFailed
+from engage_hri.schemas.faults import EngageError, Fault, RunFailed
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.world import World
 from engage_hri.services.generation.block.emission import Emission, FragmentPlan
@@ -121,10 +122,28 @@ def _scene(world: World, body: Capabilities | None, permits: Permits, config: Ge
 
 
 class BodyLink:
-    """Generation's knowledge of the body. capabilities: what it last said of itself; None: not asked yet."""
+    """Generation's knowledge of the body. capabilities: what it last said of itself; None: that is not known yet."""
 
     def __init__(self) -> None:
         self.capabilities: Capabilities | None = None
+        self._is_asked = False
+
+    def forget(self) -> None:
+        """Forget the body: another one may come."""
+        self.capabilities, self._is_asked = None, False
+
+    def described(self) -> Asking[Capabilities | None]:
+        """What the body says of itself. It is asked once; one that fails to say it is not asked again."""
+        if not self._is_asked and self.capabilities is None:
+            self._is_asked = True
+            with suppress(EngageError):
+                yield from self._describe()
+        return self.capabilities
+
+    def _describe(self) -> Asking[None]:
+        described = yield DescribeBody()
+        if isinstance(described, Capabilities):
+            self.capabilities = described
 
     def motions(
         self, sequence: Sequence[str], hand: Hand | None, moving: Sequence[BlockBehavior] = (), glance: str = ""
@@ -137,9 +156,7 @@ class BodyLink:
         if not sequence:
             return Motions({})
         if self.capabilities is None:
-            described = yield DescribeBody()
-            if isinstance(described, Capabilities):
-                self.capabilities = described
+            yield from self._describe()
         last = last_motions(moving)
         pose = pose_after(last, (yield from _estimates(last)))
         each = distinct(sequence)

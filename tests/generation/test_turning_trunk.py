@@ -1,16 +1,21 @@
 """The policy of the trunk: towards whom the robot speaks with, late, once for as long as that lasts, and back."""
 
+import asyncio
 import math
 
 import pytest
 
+from engage_hri import perceive
+from engage_hri.schemas import keys
 from engage_hri.schemas.behaviors import GazeShift, PostureShift
-from engage_hri.schemas.body import Capabilities
+from engage_hri.schemas.body import Capabilities, PerformBehavior
 from engage_hri.schemas.recognition import Floor, FloorSpeech
 from engage_hri.schemas.units import Degrees, Seconds
 from engage_hri.schemas.world import Entity, World
+from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.generation.head.trunk_policy import ALONE, LASTS
 from tests.generation.heads import AT, INHIBITED, Stage
+from tests.generation.test_talked_into import call, robot
 
 A_TRUNK = Capabilities(body="torso", types=("gazeShift",), parts=("head", "torso"))
 AHEAD, ASIDE, FAR = 10.0, 40.0, -50.0
@@ -149,3 +154,23 @@ def test_when_nobody_is_left_it_turns_back_ahead() -> None:
     arrive(stage)
     stage.until(120.0)
     assert len(turns(stage)) == 2
+
+
+async def test_a_robot_that_only_talks_turns_to_who_sits_aside(hub: MemoryHub) -> None:
+    turned: list[tuple[str, str]] = []
+
+    async def follow() -> None:
+        with hub.join("watch").subscribe(keys.BEHAVIOR) as inbox:
+            async for received in inbox:
+                told = received.message
+                if isinstance(told, PerformBehavior) and isinstance(told.behavior, GazeShift):
+                    turned.append((told.behavior.target, told.behavior.influence))
+
+    async with robot(hub) as client, perceive("ben", hub=hub, position=(1.0, 0.9, 1.2)) as ben:
+        await ben.look_at(ben.robot)
+        following = asyncio.create_task(follow())
+        await client.perform(call("It is nice that you are here, Ben, and I have a long story to tell you."))
+        await asyncio.sleep(8.0)
+        following.cancel()
+
+    assert ("ben", "WAIST") in turned
