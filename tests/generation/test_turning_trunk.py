@@ -18,7 +18,7 @@ from tests.generation.heads import AT, INHIBITED, Stage
 from tests.generation.test_talked_into import call, robot
 
 A_TRUNK = Capabilities(body="torso", types=("gazeShift",), parts=("head", "torso"))
-AHEAD, ASIDE, FAR = 10.0, 40.0, -50.0
+AHEAD, ASIDE, BESIDE_THEM, FAR = 10.0, 40.0, 80.0, -50.0
 
 
 def person(id: str, at: Degrees) -> Entity:
@@ -88,7 +88,7 @@ def test_who_is_nearly_ahead_is_faced_by_the_head_alone() -> None:
 
 
 def test_it_faces_neither_of_two_with_whom_it_speaks_by_turns() -> None:
-    stage = with_people(ann=ASIDE, ben=FAR)
+    stage = with_people(ann=ASIDE, ben=BESIDE_THEM)
     for number in range(10):
         stage.until(stage.now + LASTS - 0.1)
         stage.do(lambda arbiter, who=("ben", "ann")[number % 2]: arbiter.speak_to(who))  # type: ignore[misc]
@@ -102,7 +102,7 @@ def test_it_faces_neither_of_two_with_whom_it_speaks_by_turns() -> None:
 
 
 def test_who_speaks_to_it_for_long_is_faced_as_well() -> None:
-    stage = with_people(ann=AHEAD, ben=FAR)
+    stage = with_people(ann=AHEAD, ben=ASIDE)
     stage.until(10.0)
     stage.feed(Floor(at=AT, speeches=(FloorSpeech(actor="ben", since=AT, to=("robot",)),)))
     stage.until(11.0)
@@ -154,6 +154,23 @@ def test_when_nobody_is_left_it_turns_back_ahead() -> None:
     arrive(stage)
     stage.until(120.0)
     assert len(turns(stage)) == 2
+
+
+def test_it_turns_away_from_nobody_who_is_there_or_comes() -> None:
+    stage = with_people(ann=ASIDE, ben=FAR)
+    stage.until(30.0)
+    stage.rule()
+    assert turns(stage) == []
+
+    stage = with_people(ann=ASIDE, ben=AHEAD)
+    stage.until(LASTS)
+    stage.rule()
+    arrive(stage)
+    assert [who for _, who in turns(stage)] == ["ann"]
+    stage.feed(World(entities=(person("ann", ASIDE), person("ben", FAR))))
+    stage.until(10.0)
+    stage.rule()
+    assert [who for _, who in turns(stage)] == ["ann", ""]
 
 
 async def test_a_robot_that_only_talks_turns_to_who_sits_aside(hub: MemoryHub) -> None:
