@@ -8,7 +8,7 @@ from math import inf
 
 from msgspec.structs import replace
 
-from tests.recognition.coder import BRIEF, FACE_GRACE, LAST, ROUND, WORDS_AFTER, WORDS_WAIT, is_noise, longest_sound
+from tests.recognition.coder import BRIEF, LAST, ROUND, WORDS_AFTER, WORDS_WAIT, company, is_noise, longest_sound
 from tests.recognition.observations import ROBOT
 from tests.recognition.timeline import CALLED, LIMIT, Instant, Span, Timeline
 
@@ -38,7 +38,7 @@ def addressee(speech: Span, before: Timeline) -> str:
         return speech.told
     if not is_decided and (called := _called(speech, before)):
         return called
-    if speech.is_line or not _company(speech, before):
+    if speech.is_line or not company(speech, before):
         return ROBOT
     return _looked_at(speech, before) or _answered(speech, before)
 
@@ -98,21 +98,11 @@ def _held_at(speech: Span, before: Timeline) -> float:
     return inf
 
 
-def _company(speech: Span, before: Timeline) -> list[str]:
-    """Others who are there when somebody speaks."""
-    at = speech.since[0]
-    gone = {
-        each.who for each in before.away
-        if each.until[0] - each.since[0] >= FACE_GRACE and each.since[0] + FACE_GRACE + ROUND < at < each.until[0]
-    }  # fmt: skip
-    return [each for each in before.people if each != speech.who and each not in gone]
-
-
 def _looked_at(speech: Span, before: Timeline) -> str:
     """Whose face the speaker looks at for more than half of the speech."""
     seconds: dict[str, float] = {}
     for each in before.spans:
-        if each.who == speech.who and each.action == "look" and each.to in (ROBOT, *_company(speech, before)):
+        if each.who == speech.who and each.action == "look" and each.to in (ROBOT, *company(speech, before)):
             common = min(each.until[0], speech.until[0]) - max(each.since[0], speech.since[0])
             seconds[each.to] = seconds.get(each.to, 0.0) + max(0.0, common)
     return next((face for face, common in seconds.items() if common > HALF * speech.seconds + ROUND), "")
@@ -121,7 +111,8 @@ def _looked_at(speech: Span, before: Timeline) -> str:
 def _decided(speech: Span, before: Timeline) -> Instant:
     """When it is decided to whom a speech is, and known that it is no cough: with its words, if there are any."""
     none_come = (speech.until[0] + WORDS_AFTER, LAST) if before.is_worded else speech.until
-    return min(max(speech.until, speech.known or none_come), (speech.since[0] + longest_sound(before), 0))
+    at_last = round(speech.since[0] + longest_sound(before), 6), LAST  # what is due comes after what is seen then
+    return min(max(speech.until, speech.known or none_come), at_last)
 
 
 def _is_awaited(speech: Span, before: Timeline) -> bool:
@@ -132,7 +123,8 @@ def _is_awaited(speech: Span, before: Timeline) -> bool:
         return False
     since = [
         each for each in before.spans
-        if each.to == ROBOT and asked[-1].since < each.since and each.since[0] < at[0] and each.action != "look"
+        if each.to == ROBOT and each.since[0] < at[0] and each.action != "look"
+        and (asked[-1].since if each.who in asked[-1].to else asked[-1].until) < each.since
     ]  # fmt: skip
     return not any(
         not is_noise(each, before) and _is_known_by(each, speech, before)
@@ -144,6 +136,23 @@ def _is_awaited(speech: Span, before: Timeline) -> bool:
 def _is_known_by(each: Span, speech: Span, before: Timeline) -> bool:
     """True if it is known to whom somebody has spoken, and that it was no cough, when another's speech is decided."""
     return each.who == speech.who or _decided(each, before) <= _decided(speech, before)
+
+
+def _is_noise_by(each: Span, speech: Span, before: Timeline) -> bool:
+    """True if no words of somebody's sound are known when it is decided to whom another speech is.
+
+    Late words of one's own say nothing as long as what one has begun before they came may be for the robot.
+    """
+    is_known = each.known is not None and each.known <= _decided(speech, before)
+    said = replace(before, spans=[*before.spans, replace(speech, to=ROBOT)])
+    return is_noise(each if is_known else replace(each, known=None), said)
+
+
+def _calls_another(each: Span, speech: Span, before: Timeline) -> bool:
+    """True if somebody calls the speaker by an id of which nobody knows yet that it is the speaker's."""
+    at = _decided(speech, before)
+    is_another = any(join.who == speech.who and join.is_known and at < join.at for join in before.joins)
+    return is_another and not each.told and _called(each, before) == speech.who
 
 
 def _is_beside_words(sign: Span, before: Timeline) -> bool:
@@ -162,8 +171,9 @@ def _answered(speech: Span, before: Timeline) -> str:
         if speech.who in turn.to:
             heard += [(until[0], since[0], ROBOT, "") for since, until in turn.speech]
     for each in before.spans:
-        is_speech = each.action == "speak" and not is_noise(each, before) and speech.who in (each.who, each.to)
-        if is_speech and _is_known_by(each, speech, before):
+        is_speech = each.action == "speak" and not _is_noise_by(each, speech, before)
+        is_theirs = each.who == speech.who or (each.to == speech.who and not _calls_another(each, speech, before))
+        if is_speech and is_theirs and _is_known_by(each, speech, before):
             heard.append((each.until[0], each.since[0], each.who, each.to))
     recent = [
         (min(until, at), since, who, to) for until, since, who, to in heard if since < at <= until + LIMIT + ROUND

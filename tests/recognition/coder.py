@@ -98,15 +98,12 @@ class Coder:
         return sorted(self._events.values())
 
     def _in_order(self, acts: list[Span | Turn | Absence]) -> Iterator[Span | Turn | Absence]:
-        """All that happens, as it comes: of several who begin to speak at one time, who was asked is heard first.
-
-        Unless it is known at once what each says, and to whom: into the robot's words, where perception tells it.
-        """
+        """All that happens, as it comes: of several at one time, who was asked is heard first, then by their ids."""
         for at, together in groupby(sorted(acts, key=_known), key=lambda act: _known(act)[0]):
             yield from self._late_words(at)
             for side in self._sides.values():
                 self._expire(side, at)
-            yield from sorted(together, key=self._is_of_another)
+            yield from sorted(together, key=self._place)
         yield from self._late_words(inf)
 
     def _late_words(self, until: float) -> Iterator[Span]:
@@ -118,12 +115,10 @@ class Coder:
                 self._expire(side, _words_come(first))
             yield first
 
-    def _is_of_another(self, act: Span | Turn | Absence) -> tuple[bool, bool]:
-        speech = [each for turn in self._timeline.turns for each in turn.speech]
-        is_known = self._timeline.tells == "early" and any(since < _known(act) < until for since, until in speech)
-        if len(self._sides) == 1 or is_known:
-            return False, False
-        return isinstance(act, Absence), isinstance(act, Span) and self._sides[act.who].asked is None
+    def _place(self, act: Span | Turn | Absence) -> tuple[bool, bool, str]:
+        if len(self._sides) == 1 or not isinstance(act, Span):
+            return isinstance(act, Absence), False, ""
+        return False, self._sides[act.who].asked is None, self._timeline.id(act.who)
 
     def _note(self, kind: str, initiator: str, responder: str, at: float, state: str, **more: Any) -> None:
         self._events[kind, initiator, responder, at] = Coded(kind, initiator, responder, at, state, **more)
@@ -213,10 +208,11 @@ class Coder:
             and turn.since < each.since < turn.until
         ]  # fmt: skip
         self._used |= {id(each) for each in signs}
-        if turn.is_aborted and len(self._sides) == 1:  # of several people the cut waits in line for words
+        if turn.is_aborted:
             signs = self._without_late(signs, turn)
         every, signs = signs, [each for each in signs if not self._goes_with_words(each, turn)]
         found: list[Span] = []
+        too_late: list[Span] = []
         sets = [*self._together(signs)]
         may_be_answered = turn.kind == "asks" or side.asked is not None
         for number, sign in enumerate(sets):
@@ -234,7 +230,7 @@ class Coder:
                 if each.action == "speak" and self._interrupts(each, turn) and (each not in late or each in corrected)
             ]  # fmt: skip
             answers = sorted([*goes_on, *interrupts], key=lambda each: each.since)
-            self._late += [
+            too_late += [
                 each for each in late
                 if not parts and not answers and each not in corrected
                 and each.words not in LISTENING and self._is_last(each)
@@ -250,6 +246,8 @@ class Coder:
             for each in late if not answers else ():
                 if each.words in LISTENING and (each in corrected or self._is_last(each)):
                     self._note("backchannel", ROBOT, side.person, each.since[0], "completed")
+        if not (turn.kind == "asks" and found):  # else they are of the answer into the turn
+            self._late += too_late
         return found
 
     def _listens_beside(self, side: Side, turn: Turn) -> None:
@@ -304,15 +302,22 @@ class Coder:
         return beside and turn.until[0] - turn.since[0] <= BRIEF + ROUND
 
     def _without_late(self, signs: list[Span], turn: Turn) -> list[Span]:
-        """Leave out what is said before a turn is cut off, and known to be no listener's only later: it is a turn."""
-        late = [
-            each for each in signs
-            if each.known is not None and turn.until <= each.known and each.until < turn.until
-            and self._is_heard(each) and each.words not in LISTENING
-        ]  # fmt: skip
-        self._turns |= {id(each) for each in late}
-        beside = [each for each in signs for one in late if one.since <= each.since < one.until]
-        return [each for each in signs if each not in beside]
+        """Leave out what is said before a turn is cut off, and known to be no listener's only later: it is a turn.
+
+        A gesture beside it that goes on has answered already.
+        """
+        for one in signs:
+            if self._comes_after_cut(one, turn) and self._is_heard(one) and one.words not in LISTENING:
+                beside = [each for each in signs if one.since <= each.since < one.until]
+                goes_on = [each for each in beside if each.until > turn.until]
+                self._turns |= set() if goes_on else {id(one)}
+                signs = [each for each in signs if each in goes_on or each not in beside]
+        return signs
+
+    def _comes_after_cut(self, speech: Span, turn: Turn) -> bool:
+        """True if words of who is alone come after a turn is cut off: in company the cut waits in line for them."""
+        is_over = turn.is_aborted and speech.known is not None and speech.until < turn.until <= speech.known
+        return is_over and not company(speech, self._timeline)
 
     def _shows(self, sign: Span) -> bool:
         """True for what shows that somebody listens: a nod, or words; any sound only where no words are told."""
@@ -326,17 +331,22 @@ class Coder:
         """
         if speech.known is None or speech.seconds > WORDS_WAIT + ROUND:
             return False
-        # Of several people each next sign waits in line until the words of the one before have come.
-        is_next = len(self._sides) == 1 and following < speech.known
+        # In company each next sign waits in line until the words of the one before have come.
+        is_next = not company(speech, self._timeline) and following < speech.known
         return is_next or speech.known[0] > max(speech.since[0] + WORDS_WAIT, over[0]) + ROUND
 
     def _goes_with_words(self, sign: Span, turn: Turn) -> bool:
         """True for a gesture beside the person's own words, if these are no listener's: it says nothing more."""
         beside = self._words_beside(sign)
         own = [
-            each for each in beside
-            if each.since < turn.since or (self._interrupts(each, turn) and not self._is_told_late(each, (1e9, 0)))
-        ]  # fmt: skip
+            each
+            for each in beside
+            if each.since < turn.since
+            or (
+                self._interrupts(each, turn)
+                and not (self._is_told_late(each, (1e9, 0)) or self._comes_after_cut(each, turn))
+            )
+        ]
         return sign.action != "speak" and bool(own)
 
     def _words_beside(self, sign: Span) -> list[Span]:
@@ -364,7 +374,9 @@ class Coder:
         In company also with words that come later: it has waited for them, and what is known late has happened early.
         """
         decided = min(answer.until[0], answer.since[0] + (WORDS_WAIT if self._timeline.is_worded else BRIEF))
-        is_told_late = len(self._sides) > 1 and self._is_heard(answer) and answer.words not in LISTENING
+        is_told_late = (
+            bool(company(answer, self._timeline)) and self._is_heard(answer) and answer.words not in LISTENING
+        )
         return answer.action == "speak" and (decided < turn.until[0] - ROUND or is_told_late)
 
     def _interrupts(self, speech: Span, turn: Turn) -> bool:
@@ -391,12 +403,14 @@ class Coder:
         is_gesture = sign.action != "speak"
         goes_with_words = is_gesture and (self._words_beside(sign) or not self._is_shown_to_robot(side, sign))
         if sign.since >= side.answers_until and not goes_with_words and not self._is_noise(sign):
-            self._takes_turn(side, sign)
+            if self._timeline.is_worded and _is_late(sign) and sign.seconds <= longest_sound(self._timeline) + ROUND:
+                self._late.append(sign)
+            else:
+                self._takes_turn(side, sign)
 
     def _is_noise(self, sign: Span) -> bool:
         """True for a cough, or a laugh: no words come where they would have come, or too late to say anything."""
-        is_late = sign.known is not None and sign.known[0] > sign.until[0] + WORDS_AFTER + ROUND
-        is_unheard = sign.known is None or (is_late and not self._is_last(sign))
+        is_unheard = sign.known is None or (_is_late(sign) and not self._is_last(sign))
         is_wordless = is_unheard and self._timeline.is_worded and id(sign) not in self._used
         return sign.action == "speak" and is_wordless and sign.seconds <= longest_sound(self._timeline) + ROUND
 
@@ -463,10 +477,33 @@ def is_noise(one: Span, timeline: Timeline) -> bool:
                     return False
                 if one.who in turn.to:
                     longest, wait = WORDS_WAIT, (one.since[0] + WORDS_WAIT + ROUND, LAST)
+                    if not company(one, timeline) and _following(one, timeline) < until:
+                        wait = BEFORE  # it is told when the next sign begins
                 wait = max(wait, until)
     if one.known is None or (one.known > wait and has_spoken_since(one, timeline)):
         return one.seconds <= longest + ROUND
     return False
+
+
+def company(speech: Span, timeline: Timeline) -> list[str]:
+    """Others who are there when somebody speaks."""
+    at = speech.since[0]
+    gone = {
+        each.who for each in timeline.away
+        if each.until[0] - each.since[0] >= FACE_GRACE and each.since[0] + FACE_GRACE + ROUND < at < each.until[0]
+    }  # fmt: skip
+    return [each for each in timeline.people if each != speech.who and each not in gone]
+
+
+def _following(one: Span, timeline: Timeline) -> Instant:
+    """When the next sign of a person begins that is not at one time with this."""
+    over = one.until
+    for each in sorted(timeline.spans, key=lambda each: each.since):
+        if each.who == one.who and each.to == ROBOT and each.action != "look" and each.since > one.since:
+            if each.since > over:
+                return each.since
+            over = max(over, each.until)
+    return inf, 0
 
 
 def longest_sound(timeline: Timeline) -> float:
@@ -488,6 +525,11 @@ def has_spoken_since(one: Span, timeline: Timeline) -> bool:
 
 def _speaks_to_robot(each: Span, person: str) -> bool:
     return each.who == person and each.action == "speak" and each.to == ROBOT
+
+
+def _is_late(sign: Span) -> bool:
+    """True if the words of a speech come when nobody waits for them."""
+    return sign.known is not None and sign.known[0] > sign.until[0] + WORDS_AFTER + ROUND
 
 
 def _words_come(speech: Span) -> float:

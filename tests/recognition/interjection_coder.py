@@ -10,7 +10,16 @@ from itertools import pairwise
 from msgspec import Struct
 
 from engage_hri.schemas.recognition import Interjection
-from tests.recognition.coder import BRIEF, LAST, ROUND, WORDS_AFTER, WORDS_WAIT, has_spoken_since, longest_sound
+from tests.recognition.coder import (
+    BRIEF,
+    LAST,
+    ROUND,
+    WORDS_AFTER,
+    WORDS_WAIT,
+    has_spoken_since,
+    is_noise,
+    longest_sound,
+)
 from tests.recognition.observations import ROBOT
 from tests.recognition.timeline import LISTENING, Instant, Span, Timeline, Turn
 
@@ -97,6 +106,15 @@ def _into(timeline: Timeline) -> Iterator[Into]:
                         yield Into(speech, turn, until, is_beside=True)
 
 
+def _goes_with_words_before(gesture: Span, turn: Turn, timeline: Timeline) -> bool:
+    """True if a gesture goes with words of the person's own that began before the robot's: it says nothing more."""
+    return any(
+        each.who == gesture.who and each.action == "speak" and each.to == ROBOT
+        and each.since < turn.since and each.since < gesture.since < each.until and not is_noise(each, timeline)
+        for each in timeline.spans
+    )  # fmt: skip
+
+
 def _reading(one: Into, timeline: Timeline) -> set[str]:
     """What it is. Where two are right it is known in one instant, or too late for one that listens."""
     speech, turn, known = one.speech, one.turn, one.speech.known
@@ -118,6 +136,7 @@ def _reading(one: Into, timeline: Timeline) -> set[str]:
         each for each in timeline.spans
         if each.who == speech.who and each.action in ("nod", "shake", "point")
         and turn.since < each.since < speech.until and speech.since < each.until
+        and not _goes_with_words_before(each, turn, timeline)
     ]  # fmt: skip
     is_long = speech.seconds > WORDS_WAIT + ROUND and wait < over  # it has been one that interrupts before
     is_of_answer = not is_long and turn.kind == "asks" and any(turn.until < each.until for each in beside)

@@ -24,6 +24,7 @@ It is a cough, or a laugh at what a neighbor says.
 
 from collections.abc import Iterable, Mapping
 from math import inf
+from typing import Literal
 
 from msgspec import Struct, field
 
@@ -58,19 +59,10 @@ class Spoken(Struct, kw_only=True):
     since: Seconds
     to: Addressees | None = None
     until: Seconds | None = None
-    is_noise: bool = False
-    """True if no words have come of it."""
-    may_be_noise: bool = False
-    """True as long as words of it would tell that it is no cough."""
-    is_open: bool = False
-    """True as long as it is not decided what it is that somebody says into the robot's words."""
+    sound: Literal["unsure", "speech", "noise"] = "speech"
+    """What it is: noise if no words have come of it, unsure as long as these would tell that it is no cough."""
     noted_at: Seconds = inf
     """Time from which on it counts for what others say; infinite: it does not yet."""
-
-    @property
-    def is_speech(self) -> bool:
-        """True if it is known to be no cough."""
-        return not (self.is_noise or self.may_be_noise)
 
     @property
     def named(self) -> Addressees:
@@ -170,7 +162,7 @@ def likely(
     # Those that it comes during, or at most `within` after: few of all.
     recent = [each for each in spoken if each.since < at and (each.until is None or at <= each.until + within)]
     known = [each for each in recent if each.noted_at <= by]
-    heard = [each for each in known if (each.actor == actor or each.is_to(actor)) and each.is_speech]
+    heard = [each for each in known if (each.actor == actor or each.is_to(actor)) and each.sound == "speech"]
     # Who still goes on is the last, however that may end.
     last = max(heard, key=lambda each: (at if each.until is None else min(each.until, at), each.since), default=None)
     if last is None:

@@ -204,11 +204,8 @@ class AdjacencyPair(Machine):
         if self.event is None or self._turn_end is not None:
             return
         if self.state == INTERRUPTED:
-            if self._by_robot:
-                self.interrupted_until = at
             self._turn_end = at
-            self.event.delay = self.event.response_since - at
-            self.step("turn_ends", at)
+            self._succeed("turn_ends", at)
             if self._response_until is not None:
                 self._end_response("response_ends", at)
         elif self.state in (ROBOT_WAITING, HUMAN_WAITING):
@@ -345,10 +342,11 @@ class AdjacencyPair(Machine):
         return True
 
     def robot_begins(self, action: Action, at: Seconds) -> None:
-        """Take speech or a gesture of the robot, which answers a waiting person."""
-        self._pass_limit(at)
-        if self.state == HUMAN_WAITING:
+        """Take speech or a gesture of the robot: it answers a waiting person, or goes on with the answer."""
+        if self.state == HUMAN_WAITING and in_time(at, self.deadline):
             self._answer("robot_answers", action, at)
+        elif self.event is not None and self.is_cut_into and action == self.event.response:
+            self._response_until = None
 
     def _answer(self, given: str, action: Action, at: Seconds) -> None:
         assert self.event is not None
@@ -356,8 +354,16 @@ class AdjacencyPair(Machine):
         if self._turn_end is None:
             self.step("responder_interrupts", at)
         else:
-            self.event.delay = at - self._turn_end
-            self.step(given, max(at, self._turn_end))
+            self._succeed(given, max(at, self._turn_end))
+
+    def _succeed(self, given: str, at: Seconds) -> None:
+        """Take the answer to a turn that is over. It may have begun before that."""
+        assert self.event is not None
+        assert self._turn_end is not None
+        self.event.delay = self.event.response_since - self._turn_end
+        if self._by_robot and self.event.delay <= 0:
+            self.interrupted_until = self._turn_end
+        self.step(given, at)
 
     def ends(self, action: Action, at: Seconds, *, by_robot: bool) -> None:
         """End an action of person or robot: it may be the person's first turn, or the response."""

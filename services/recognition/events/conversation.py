@@ -160,14 +160,13 @@ class Dialogue:
 
     def robot_speaks(self, at: Seconds) -> None:
         """Take the beginning of the robot's speech, which is no backchannel that was announced."""
-        self.robot_speaks_since = at
-        self.exchange.pair.robot_heard(None)
-        if self._speech is not None and not self.exchange.pair.robot_holds_turn:
-            if self.robot_backchannel.state != BRIEF and not self.exchange.pair.is_cut_into:
+        pair, self.robot_speaks_since = self.exchange.pair, at
+        pair.robot_heard(None)
+        if self._speech is not None and not pair.robot_holds_turn and not self.exchange.is_cut_into:
+            if self.robot_backchannel.state != BRIEF:
                 self.robot_backchannel.begin(self._robots_backchannel(at), "speaks")
         else:
-            self.exchange.pair.robot_begins("speak", at)
-            self.exchange.pair.forget_unanswered()
+            pair.robot_begins("speak", at)
 
     def robot_falls_silent(self, at: Seconds) -> None:
         self.robot_speaks_since = None
@@ -225,7 +224,6 @@ class Dialogue:
             self.exchange.pair.repaired(at)
         self._drop_robots_sign(at)
         self.exchange.pair.robot_begins("speak", at)
-        self.exchange.pair.forget_unanswered()
 
     def _robot_takes_floor(self, at: Seconds, given: str = "limit") -> None:
         self.exchange.pair.robot_begins("speak", self.robot_backchannel.takes_floor(given, at))

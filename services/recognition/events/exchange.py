@@ -54,6 +54,11 @@ class Exchange:
     def is_open(self) -> bool:
         return self.pair.event is not None or any(pair.event is not None for pair, _ in self._cut_into)
 
+    @property
+    def is_cut_into(self) -> bool:
+        """True if the robot has begun to answer the person, who still speaks: what it says then is of that answer."""
+        return any(pair.is_cut_into for pair in self._pairs())
+
     def _pairs(self) -> Iterator[AdjacencyPair]:
         yield from (pair for pair, _ in self._cut_into)
         yield self.pair

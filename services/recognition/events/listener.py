@@ -66,8 +66,6 @@ class Listener:
             self.sign = ListenerSign([], is_beside=beside)
         self.sign.parts.append(part)
         self.sign.is_wordless = False  # this one's words may come
-        if part.action == "speak":
-            self._scene.read(self._id, part.since, "open", part.since)
 
     def listens_to(self, part: SignPart) -> bool:
         """True if this is part of the sign."""
@@ -164,20 +162,19 @@ class Listener:
             is_speech = part.action == "speak"
             may_answer = not self.is_beside and self._exchange.pair.may_be_answered_with(part.action)
             if not self._is_echo(part) if is_speech else may_answer:
-                is_gesture_of_answer = reading == "answer" and not is_speech
-                if sign is not None and is_gesture_of_answer and self._awaits_words_before(sign, part):
+                if sign and not is_speech and reading == "answer" and self._awaits_words_before(sign, part):
                     sign.outlasting = part
                 else:
                     self._takes_floor(part, at, reading)
                 return
 
     def _awaits_words_before(self, sign: ListenerSign, part: SignPart) -> bool:
-        """True if words may still come of the last speech of the sign, and it began before a part of it."""
+        """True if words may still come of the last speech of the sign, and it did not begin after a part of it."""
         if not self._scene.is_worded or sign.is_wordless or not sign.speeches:
             return False
         speech = sign.speeches[-1]
-        may_come = self._writer.now < speech.since + WORDS_WAIT and not self._asks_for_nothing(speech)
-        return may_come and speech.since < part.since
+        is_waiting = self._writer.now < speech.since + WORDS_WAIT
+        return is_waiting and speech.since <= part.since and not self._asks_for_nothing(speech)
 
     def understand(self, speech: SignPart, at: Seconds, *, in_turn: bool, is_last: bool) -> None:
         """Judge a speech by its words.

@@ -131,14 +131,9 @@ class Answered(NamedTuple):
     at: Seconds
 
     @property
-    def began(self) -> Seconds:
-        """Time when the answer began."""
-        return self.event.response_since
-
-    @property
     def place(self) -> tuple[Seconds, bool, str]:
-        """Place of the answer among all; see `SessionScene.place`."""
-        return self.began, self.event.answered_by != self.event.responder, self.event.answered_by
+        """Place of the answer among all: since when, and by whom; see `SessionScene.place`."""
+        return self.event.response_since, self.event.answered_by != self.event.responder, self.event.answered_by
 
 
 class EventWriter:

@@ -4,6 +4,7 @@ It is found by the rules of `addressing`, when the speech begins and with all th
 answered the robot, and what becomes of a sound, says the talk, which tells it to the conversation in its order.
 """
 
+from collections import deque
 from math import inf
 
 from engage_hri.schemas.units import Probability, Seconds
@@ -22,6 +23,8 @@ from engage_hri.services.recognition.events.machine import EventWriter
 from engage_hri.services.recognition.events.scene import SessionScene
 from engage_hri.services.text.listening import says_words
 
+LOOKS_KEPT = 16
+"""Number of looks of each person that are remembered, for a speech that is told when it is over."""
 SPEECHES_KEPT = 8
 """Number of speeches of each person of which words may still tell what they were, and for whom."""
 
@@ -32,6 +35,8 @@ class OwnSpeeches:
     def __init__(self, id: str, scene: SessionScene, config: RecognitionConfig, writer: EventWriter) -> None:
         self.going_on: OwnSpeech | None = None
         """The speech of the person that goes on."""
+        self.looks: deque[tuple[Seconds, str]] = deque(maxlen=LOOKS_KEPT)
+        """Whose face the person has looked at, and since when; "": nobody's."""
         self._id = id
         self._scene = scene
         self._config = config
@@ -42,9 +47,12 @@ class OwnSpeeches:
     # -- what is remembered -------------------------------------------------------------------------------------
 
     def begin(self, since: Seconds, confidence: Probability, face: str) -> OwnSpeech:
-        """Begin to remember a speech. face: whose face the person looks at."""
-        part = SignPart("speak", since, confidence)
-        speech = OwnSpeech(actor=self._id, since=since, part=part, faces=FaceTimes(since, face))
+        """Begin to remember a speech. face: whose face the person looks at now."""
+        faces = FaceTimes(since)
+        for at, looked_at in self.looks:
+            faces.turns(looked_at, at)
+        faces.face = face
+        speech = OwnSpeech(actor=self._id, since=since, part=SignPart("speak", since, confidence), faces=faces)
         self.remember(speech)
         return speech
 
@@ -65,6 +73,12 @@ class OwnSpeeches:
         said = [each for each in (*self._scene.spoken, *self._latest.values()) if each.actor == self._id]
         return any(each is not but and each.overlaps(since, until) for each in said)
 
+    def rename(self, other: str, kept: str) -> None:
+        """Take the face of somebody for that of who they turn out to be."""
+        self.looks = deque(((at, kept if face == other else face) for at, face in self.looks), LOOKS_KEPT)
+        for speech in self._latest.values():
+            speech.faces.rename(other, kept)
+
     def forget(self) -> None:
         """Forget what the person has said before they left."""
         self._latest.clear()
@@ -75,7 +89,6 @@ class OwnSpeeches:
         """Take the words of a speech. told: addressees, if perception knows them."""
         if says_words(words):
             speech.worded_at = at if speech.worded_at == -inf else speech.worded_at
-            self._scene.is_no_noise(speech, at)
         speech.words, speech.told = words or speech.words, told or speech.told
 
     def is_certain(self, speech: OwnSpeech, at: Seconds) -> bool:
@@ -91,7 +104,6 @@ class OwnSpeeches:
         """Take it that the speech is for these."""
         speech.to = to
         if self._scene.robot not in to:
-            speech.is_open = False
             self._writer.decide_interjection(self._id, speech.since, "other", at)
         elif speech.until is None:
             self.may_interrupt(speech, "", at)

@@ -116,8 +116,8 @@ class People:
         self._drop(other, at, at)
         self._contacts.pop(kept, None)  # what was told of the other may be taken for it
         gazes = [self._scene.gaze, *(person.gazes.gaze for person in self.persons.values())]
-        for speech in (each for person in self.persons.values() for each in person.talk.speeches.in_order()):
-            speech.faces.rename(other, kept)
+        for person in self.persons.values():
+            person.talk.speeches.rename(other, kept)
         for gaze in gazes:
             gaze.targets = tuple(kept if target == other else target for target in gaze.targets)
         if is_found:
@@ -275,8 +275,7 @@ def _keep(kept: dict[str, Value], id: str, value: Value | None) -> bool:
 
 def _answered_by_other(taken_up: TakenUp, asked: PersonRecognition) -> None:
     """Tell the person who was asked that somebody else has answered."""
-    _, by, action, at = taken_up
-    asked.talk.take_early(at, lambda talk: talk.exchange.pair.other_answers(by, action, at))
+    asked.talk.take_early(taken_up.at, lambda talk: talk.exchange.pair.other_answers(*taken_up[1:]))
 
 
 def _answered_for_all(answered: OngoingEvent, at: Seconds, asked: PersonRecognition) -> None:

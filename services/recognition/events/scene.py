@@ -270,11 +270,11 @@ class SessionScene:
             spoken.noted_at = at
             self.spoken.append(spoken)
 
-    def is_no_noise(self, spoken: Spoken, at: Seconds) -> None:
-        """Note that a sound is no noise, or that nothing else may be known of it: it counts for others since then."""
-        if spoken.may_be_noise:
-            spoken.may_be_noise, spoken.noted_at = False, max(at, spoken.noted_at)
-            self.floor_changes += 1
+    def decide(self, spoken: Spoken, at: Seconds, *, is_noise: bool = False) -> None:
+        """Note what a sound is: it counts for what others say since then."""
+        spoken.noted_at = max(at, spoken.noted_at) if spoken.sound == "unsure" else spoken.noted_at
+        spoken.sound = "noise" if is_noise else "speech"
+        self.floor_changes += 1
 
     def spoken_since(self, actor: str, since: Seconds) -> Spoken | None:
         """The speech that began then; None: it is not known to whom it was, or long ago."""
@@ -285,7 +285,7 @@ class SessionScene:
 
         What may be noise counts as said, as long as it is not decided.
         """
-        said = [each for each in self.spoken if since < each.since <= until and not each.is_noise]
+        said = [each for each in self.spoken if since < each.since <= until and each.sound != "noise"]
         robot = self.robot
         return not any(
             each.is_to(robot) if each.actor == person else each.actor == robot and each.is_to(person) for each in said
@@ -306,14 +306,11 @@ class SessionScene:
     def read(self, actor: str, since: Seconds, reading: InterjectionReading, at: Seconds) -> None:
         """Take what a speech into the robot's words is, as is known at `at`."""
         if (spoken := self.spoken_since(actor, since)) is not None:
-            spoken.is_open, spoken.is_noise = reading == "open", reading == "noise"
-            self.floor_changes += 1
-            if not spoken.is_open:
-                self.is_no_noise(spoken, at)
+            self.decide(spoken, at, is_noise=reading == "noise")
 
     def ended(self) -> list[Spoken]:
         """The speeches that were over last, in the order of their ends: of those known to be some, and to whom."""
-        known = [each for each in self.spoken if each.named and each.is_speech and not each.is_open]
+        known = [each for each in self.spoken if each.named and each.sound == "speech"]
         over = [(each.until, each.since, each.actor, each) for each in known if each.until is not None]
         return [one[-1] for one in sorted(over, key=lambda one: one[:-1])[-ENDED_TOLD:]]
 

@@ -80,8 +80,6 @@ class Session:
         """Persons with a task in hand."""
         self.contacts = self._people.contacts
         """Tells contact with each person for whom it has changed since the last call."""
-        self.has_open_event = self._writer.has_open
-        """Tells whether an event is open with a person."""
         self.remember = self._writer.remember
         """Takes an interjection that a former life has told, so that it is not told again."""
         self._ended_turns: Latest[str, Seconds] = Latest(TURNS_KEPT)
@@ -111,6 +109,11 @@ class Session:
     def in_company(self) -> bool:
         """True if more than one person is here."""
         return len(self.scene.company("")) > 1
+
+    def has_open_event(self, person: str) -> bool:
+        """True if an event with the person is open, or asked for and not begun."""
+        is_asked = any(person in (event.initiator, event.responder) for event, _ in self._live.values())
+        return is_asked or self._writer.has_open(person)
 
     def floor(self) -> list[Spoken]:
         """All speeches that go on, the first first; their addressees may not be known yet."""

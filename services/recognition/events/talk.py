@@ -67,8 +67,7 @@ class Talk(KindRecognizer):
     @property
     def undecided_since(self) -> Seconds | None:
         """Start of the first of what the person says of which it is not known whether it is for the robot."""
-        listener = self._conversation.listener
-        beside = None if listener.sign is None else listener.beside_since
+        beside = self._conversation.listener.beside_since
         return self._line[0][0] if beside is None and self._line else beside
 
     @property
@@ -85,7 +84,7 @@ class Talk(KindRecognizer):
         if is_asked:
             since.append(pair.interrupted_since)
         if sign is not None and (sign.is_beside or is_asked):
-            since += [each.since for each in sign.speeches]
+            since.append(sign.since)
         return (min(since, default=inf), not is_asked, self.id) < answered.place
 
     @property
@@ -133,10 +132,10 @@ class Talk(KindRecognizer):
 
     def looks_at(self, face: str, at: Seconds) -> None:
         """Take a look at a face, or away from all ("")."""
-        for speech in self._undecided:
-            if speech.until is None:
-                speech.faces.turns(face, at)
-                self.speeches.may_interrupt(speech, face, at)
+        self.speeches.looks.append((at, face))
+        if (speech := self.speeches.going_on) is not None:
+            speech.faces.turns(face, at)
+            self.speeches.may_interrupt(speech, face, at)
         self.go_on(at)
 
     def begins(self, began: ActionBegan, at: Seconds, face: str) -> None:
@@ -163,16 +162,13 @@ class Talk(KindRecognizer):
         speech.told = self._scene.told_to(self.id, at)
         speech.words = speech.part.words = self._writer.text_of(self.id, at)
         # What waits in line may be the robot's own turn, so that only the scene knows that it has begun.
-        said = self._scene.robot_spoken
-        is_into_words = said is not None and said.since <= at
-        is_to_person = said is not None and said.is_to(self.id)
-        speech.is_beside = is_into_words and not is_to_person
-        is_in_pause = self._scene.turn is not None and self._scene.turn[0] == self._asked_in_turn
-        may_be_in_turn = (is_into_words and is_to_person) or is_in_pause
-        is_line = self._scene.lines.get(self.id) == at
-        speech.may_be_noise = self._scene.is_worded and not (is_line or says_words(speech.words))
+        said, turn = self._scene.robot_spoken, self._scene.turn
+        is_to_person = said.is_to(self.id) if said is not None and said.since <= at else None
+        speech.is_beside = is_to_person is False
+        may_be_in_turn = bool(is_to_person) or (turn is not None and turn[0] == self._asked_in_turn)
+        is_unsure = self._scene.is_worded and not says_words(speech.words)
+        speech.sound = "unsure" if is_unsure and self._scene.lines.get(self.id) != at else "speech"
         speech.is_into_turn = may_be_in_turn if self._line else self._conversation.is_into_turn(at)
-        speech.is_open = speech.is_into_turn or speech.is_beside
         self.speeches.is_certain(speech, at)
         self.speeches.may_interrupt(speech, face, at)
         self._queue(at, speech)
@@ -225,10 +221,12 @@ class Talk(KindRecognizer):
             self._writer.interject_again(self.id, since, at)
             return
         self.speeches.hear(speech, words, told, at)
-        if not speech.is_heard or speech.is_noise:
+        if not speech.is_heard or speech.sound == "noise":
             self._has_news(speech, at)
         known, over = speech.words, (at if speech.until is None else speech.until) + WORDS_AFTER
         is_in_time = at <= max(since + WORDS_WAIT, over if speech.is_beside else since) + ROUNDING
+        if speech.sound == "unsure" and says_words(known) and (is_in_time or not self._is_into_words(speech)):
+            self._scene.decide(speech, at)
         # What has been waited for was known when the speech began. The line waits for no words of who is alone.
         if is_in_time and speech.company and any(each is speech for _, each in self._line):
             speech.part.words = known
@@ -246,30 +244,32 @@ class Talk(KindRecognizer):
         speech.part.words = words or speech.part.words
         talk.understand(speech.part, at)
         self._writer.interject_again(self.id, speech.since, at)
-        is_late = speech.is_noise and says_words(speech.words)
+        is_late = speech.sound == "noise" and says_words(speech.words)
         is_new = is_late if speech.is_heard else speech.is_to(self._scene.robot)
         if is_new and self._scene.is_last(self.id, speech.since, at):
             if not speech.is_heard:  # else it is beside a gesture that was told
                 talk.exchange.take(speech.part)
-            speech.is_noise, speech.is_heard = False, True
-            self._scene.floor_changes += 1
+            speech.is_heard = True
+            self._scene.decide(speech, at)
 
     def _has_news(self, speech: OwnSpeech, at: Seconds) -> None:
         """Take news of a speech of which nothing is told yet: it may be for others than it seemed, and no noise."""
-        if speech.is_noise and not says_words(speech.words):
+        is_noise = speech.sound == "noise"
+        if is_noise and not says_words(speech.words):
             return
-        if not self.speeches.is_certain(speech, at) and speech.is_noise and not speech.is_heard:
+        if not self.speeches.is_certain(speech, at) and is_noise and not speech.is_heard:
             self.speeches.address(speech, self._likely(speech, at), at)
         if not speech.is_to(self._scene.robot):
-            speech.is_noise = speech.is_heard = False  # more of the words may still call it
-            speech.part.taken_for = ""
+            speech.is_heard, speech.part.taken_for = False, ""  # more of the words may still call it
+            if is_noise:
+                self._scene.decide(speech, at)
         elif not speech.is_heard and not any(each is speech for _, each in self._line):
             speech.part.until = speech.until
+            speech.is_heard = speech.until is None or speech.is_into_turn or speech.is_beside
             if speech.until is None:
-                speech.is_heard = True
                 self.take_early(speech.since, lambda talk: talk.speaks(speech.part, beside=speech.is_beside))
-            elif speech.is_into_turn or speech.is_beside:
-                speech.is_noise = speech.is_heard = True
+            elif speech.is_heard:
+                self._scene.decide(speech, at, is_noise=True)
                 speech.part.taken_for = "noise"  # as such it is judged by its words
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
@@ -277,8 +277,9 @@ class Talk(KindRecognizer):
         if self.speeches.going_on is not None and self.speeches.going_on.until is None:
             self.speeches.going_on.until = until
         self.speeches.going_on = None
-        for speech in self._undecided:
-            self._decide(speech, at)
+        for _, each in self._line:
+            if isinstance(each, OwnSpeech) and not self._is_known(each):
+                self._decide(each, at)
         self.go_on(at)
         self._take_in_order(nextafter(at, inf), lambda talk: self._is_gone(talk, at, until))
 
@@ -410,7 +411,7 @@ class Talk(KindRecognizer):
         """True if the first in line waits until it is known whether somebody else has answered before."""
         since, (at, first) = self.undecided_since, self._line[0]
         for each in self._writer.answered:
-            if each.began <= at and not self.may_answer_before(each):
+            if each.place[0] <= at and not self.may_answer_before(each):
                 return True  # it is to be told first that this has answered for all
         if since is None or (isinstance(first, QuestionEnd) and first.is_cut_off):
             return since is not None and self._scene.is_contested(self.id, since)
@@ -419,13 +420,6 @@ class Talk(KindRecognizer):
             isinstance(first, QuestionEnd) and self._conversation.exchange.pair.may_be_answered
         )
         return may_matter and self._waits_for_others(since)
-
-    @property
-    def _undecided(self) -> list[OwnSpeech]:
-        return [
-            each for _, each in self._line
-            if isinstance(each, OwnSpeech) and not each.is_decided and (each.to is None or each.may_be_noise)
-        ]  # fmt: skip
 
     def _undecided_first(self) -> OwnSpeech | None:
         """The first in line, if it is a speech that is not decided; None: it is to be told next."""
@@ -439,11 +433,11 @@ class Talk(KindRecognizer):
         return is_into_words and (may_be if speech.to is None else speech.is_to(self._scene.robot))
 
     def _is_known(self, speech: OwnSpeech) -> bool:
-        """True if it is known to whom the first speech in line is, and that it is no cough.
+        """True if it is known to whom a speech in line is, and that it is no cough.
 
         Of who is alone with it the conversation judges, if it is into the robot's words.
         """
-        may_be_noise = speech.may_be_noise and (speech.company or not self._is_into_words(speech))
+        may_be_noise = speech.sound == "unsure" and (speech.company or not self._is_into_words(speech))
         return speech.is_decided or (speech.to is not None and not may_be_noise)
 
     def _queue(self, at: Seconds, speech: OwnSpeech) -> None:
@@ -461,22 +455,20 @@ class Talk(KindRecognizer):
         if speech.is_to(self._scene.robot):
             speech.is_heard = True
             self._conversation.speaks(speech.part, beside=speech.is_beside)
-            is_sign = self._conversation.listener.listens_to(speech.part)
-            speech.is_open &= is_sign
-            if not is_sign:
-                self._scene.is_no_noise(speech, self._writer.now)
+            if speech.sound == "unsure" and not self._conversation.listener.listens_to(speech.part):
+                self._scene.decide(speech, self._writer.now)
 
     def _decide(self, speech: OwnSpeech, at: Seconds) -> None:
         """Decide what the sound is, by what was known when it was due: nothing, or to whom it is."""
         at = min(at, self._decided_at(speech))  # it may have waited in line since
         to = self._likely(speech, at) if speech.to is None else speech.to
         is_judged_here = not self._is_into_words(speech) or self._scene.robot not in to
-        is_noise = is_judged_here and speech.may_be_noise and speech.until is not None
+        is_noise = is_judged_here and speech.sound == "unsure" and speech.until is not None
         speech.is_decided = True
-        if is_judged_here:
-            self._scene.is_no_noise(speech, at)
+        if is_judged_here and speech.sound == "unsure":
+            self._scene.decide(speech, at, is_noise=is_noise)
         if is_noise:
-            speech.is_noise, speech.is_open, speech.to = True, False, NOBODY
+            speech.to = NOBODY
             self._writer.decide_interjection(self.id, speech.since, "noise", at)
         elif speech.to is None:
             self.speeches.address(speech, to, at)
@@ -499,9 +491,9 @@ class Talk(KindRecognizer):
 
     def go_on(self, now: Seconds) -> None:
         """Tell all in line up to the next speech of which it is not known to whom it is."""
-        if self._line and (waits := self._conversation.listener.waits_until) <= now:
-            self._conversation.pass_time(waits)
         while self._line:
+            if (waits := self._conversation.listener.waits_until) <= now:
+                self._conversation.pass_time(waits)
             at, item = self._line[0]
             self._catch_up(at)
             if (speech := self._undecided_first()) is not None:
