@@ -47,6 +47,7 @@ CONTENTS = {
     ),
     "How it works": (
         "architecture",
+        "files",
         "generation",
         "realizer",
         "recognition",

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from engage_hri.services.commandline.app import COMMANDS, command
+from engage_hri.services.commandline.look.watch import SUBJECTS
 from tests.docs.clone import ROOT
 from tests.docs.pages import (
     Shown,
@@ -119,6 +120,12 @@ def test_every_option_of_the_page_on_commands_is_there():
         known = {option for param in command(name).params for option in param.opts}
         heads = re.findall(r"^- (`--.*?):? *", sections[name], re.MULTILINE)
         assert {option for head in heads for option in re.findall(r"--[\w-]+", head)} <= known, name
+
+
+def test_the_page_on_commands_names_all_that_can_be_watched():
+    (told,) = re.findall(r"^- `--only WHAT`.*$", PAGES["docs/commands.md"], re.MULTILINE)
+
+    assert set(re.findall(r"`(\w+)`", told)) == set(SUBJECTS)
 
 
 def test_an_extra_that_a_page_installs_is_one():
