@@ -133,7 +133,7 @@ class BodyLink:
         self.capabilities, self._is_asked = None, False
 
     def described(self) -> Asking[Capabilities | None]:
-        """What the body says of itself. It is asked once; one that fails to say it is not asked again."""
+        """Ask the body what it can, once; one that fails to say it is not asked again. None: that is not known."""
         if not self._is_asked and self.capabilities is None:
             self._is_asked = True
             with suppress(EngageError):
