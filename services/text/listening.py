@@ -7,6 +7,7 @@ such as "well" and "but", nor thanks, with which one ends. What is part of many 
 
 import re
 from functools import lru_cache
+from unicodedata import normalize
 
 TEXTS_KEPT = 64
 """Number of texts of which is remembered what they are: the words of a speech are judged at each step of the talk."""
@@ -20,22 +21,28 @@ BY_LANGUAGE = {
     "goodness, my goodness, oh my, my god, no way, no kidding, you don't say, really, is that so, i see, oh i "
     "see, i know, i understand, i get it, got it, gotcha, understood, go on, go ahead, carry on, keep going, "
     "continue, please continue, please go on, tell me more, i'm listening, haha, ha, hehe, heh, lol",
-    "de": "ja, jaja, jo, jep, jup, jawohl, genau, ganz genau, okay, ah, oh, äh, ähm, öh, aha, ach, ach so, achso, "
-    "ach ja, ach komm, ach wirklich, mhm, hmhm, hm, stimmt, das stimmt, gut, klar, na klar, na gut, naja, na "
-    "ja, verstehe, versteh, ich verstehe, verstanden, ich weiß, weiß ich, kapiert, richtig, sicher, bestimmt, "
-    "natürlich, selbstverständlich, logisch, freilich, absolut, definitiv, auf jeden fall, einverstanden, in "
-    "ordnung, passt, geht klar, das, das ist, sehr, wie, schön, wahr, toll, super, prima, perfekt, wunderbar, "
-    "klasse, krass, cool, wow, interessant, spannend, lustig, echt, wirklich, tatsächlich, eben, alles klar, "
-    "soso, so so, ach was, sag bloß, oje, oh je, meine güte, mein gott, du hast recht, da hast du recht, "
-    "weiter, erzähl weiter, mach weiter, red weiter, sprich weiter, nur weiter, und weiter, ich höre, ich "
-    "höre zu, haha, hihi, hehe",
+    "de": "ja, jaja, jo, joa, jep, jup, jawohl, jawoll, genau, ganz genau, ganz richtig, ist ja, ach nee, okay, "
+    "ah, oh, äh, ähm, öh, aha, ach, ach so, achso, ach ja, ach komm, ach wirklich, mhm, hmhm, hm, stimmt, "
+    "das stimmt, gut, klar, na klar, na gut, naja, na ja, verstehe, versteh, ich verstehe, verstanden, "
+    "ich weiß, weiß ich, kapiert, richtig, sicher, bestimmt, natürlich, selbstverständlich, logisch, freilich, "
+    "absolut, definitiv, auf jeden fall, einverstanden, in ordnung, passt, geht klar, das, das ist, sehr, wie, "
+    "schön, wahr, toll, super, prima, perfekt, wunderbar, klasse, krass, cool, wow, interessant, spannend, "
+    "lustig, echt, wirklich, tatsächlich, eben, alles klar, soso, so so, ach was, sag bloß, oje, oh je, "
+    "meine güte, mein gott, du hast recht, da hast du recht, weiter, erzähl weiter, mach weiter, red weiter, "
+    "sprich weiter, nur weiter, und weiter, ich höre, ich höre zu, haha, hihi, hehe",
     "fr": "oui, ouais, d'accord, ah, ah bon, bon, bien, hum, exact, exactement, voilà, je vois, bien sûr, c'est ça",
     "es": "sí, claro, vale, ajá, ya, bueno, bien, exacto, entiendo, ya veo, de acuerdo, por supuesto",
     "it": "sì, certo, va bene, ho capito, capisco, esatto, già, bene, bello, d'accordo",
     "pt": "sim, certo, pois, pois é, claro, tá, tá bom, bem, entendi, exato",
     "nl": "ja, oké, precies, klopt, juist, goed, inderdaad, ik snap het, natuurlijk, tuurlijk",
     "ru": "да, ага, угу, хорошо, понятно, ясно, точно, конечно, верно, ладно",
-    "ja": "うん, はい, ええ, そう, そうですね, そうですか, へえ, なるほど, ほう",
+    "ja": "うん, はい, はーい, ええ, え, あ, あー, お, おー, おお, そう, そうですね, そうですよね, そうですか, "
+    "そうなんだ, そうなんですか, そうなんですね, そうだね, そうだよね, そうか, そっか, へえ, へー, ほう, ほー, "
+    "ふーん, ふうん, なるほど, なるほどね, なるほどですね, 確かに, たしかに, もちろん, 本当, 本当に, "
+    "本当ですか, ほんと, ほんとに, ほんとう, マジ, マジで, まじで, すごい, すごいですね, すごいね, 面白い, "
+    "面白いですね, おもしろい, いいね, いいですね, わかる, わかった, わかりました, 分かった, 分かりました, "
+    "了解, 了解です, オッケー, オーケー, どうぞ, 続けて, 続けてください, 笑, はは, ハハ, あはは, アハハ, "
+    "わはは, ふふ, フフ, へへ, えへへ",
     "zh": "嗯, 对, 好, 是, 哦, 好的, 是的, 对对, 啊",
 }  # fmt: skip
 """Phrases of each language, with commas between them."""
@@ -64,7 +71,8 @@ def _plain(text: str) -> str:
 
     "Hmm, mm-hmm!" is "hm m hm", "hahahaha" is "haha". What stands in brackets is no word: "(coughs) yes" is "yes".
     """
-    said = re.sub(r"\[[^]]*\]|\([^)]*\)|\*[^*]*\*|<[^>]*>", " ", text.casefold().replace("’", "'"))
+    said = normalize("NFKC", text).casefold().replace("’", "'")
+    said = re.sub(r"\[[^]]*\]|\([^)]*\)|\*[^*]*\*|<[^>]*>|【[^】]*】", " ", said)
     said = re.sub(r"(\w)\1+", r"\1", " ".join(re.findall(r"\w+", said)))
     return re.sub(r"\b(\w{2,3})\1+(\w?)\b", r"\1\1", said)
 
@@ -73,8 +81,10 @@ def _pattern() -> re.Pattern[str]:
     phrases = sorted(
         {_plain(each) for told in BY_LANGUAGE.values() for each in told.split(",")}, key=len, reverse=True
     )
-    spaced = "|".join(re.escape(each) for each in phrases if each.isascii() or each[0] < "\u3000")
-    joined = "|".join(re.escape(each) for each in phrases if each[0] >= "\u3000")
+    # A syllable alone is part of any word: "あ" and "お" are a listener's, and "あお" is blue.
+    is_joined = {each: each[0] >= "\u3400" or (each[0] >= "\u3000" and len(each) > 1) for each in phrases}
+    spaced = "|".join(re.escape(each) for each in phrases if not is_joined[each])
+    joined = "|".join(re.escape(each) for each in phrases if is_joined[each])
     unit = rf"(?:{spaced}|(?:{joined})+)"
     return re.compile(rf"{unit}(?: {unit})*")
 

@@ -268,3 +268,54 @@ def test_what_was_told_last_of_each_event_is_told_by_present_ids(seed: int) -> N
 
     for event in meeting.last_of_each():
         assert not {event.initiator, event.responder, event.answered_by} & meeting.names.keys(), event
+
+
+@pytest.mark.parametrize("begins", [2.9, 3.0, 3.1])
+def test_who_is_another_may_have_begun_when_the_voice_of_that_was_over(begins: float) -> None:
+    """What is said by an id that is another's is over at 3.0, and it is not known yet what it was."""
+    meeting = of_two_ids()
+    meeting.begins("face", "speak", 2.5)
+    steps = [(begins, meeting.begins, "ann"), (3.0, meeting.ends, "face"), (3.6, meeting.ends, "ann")]
+    for at, step, id in sorted(steps[:2], key=lambda each: each[0]) + steps[2:]:
+        meeting.later(at, partial(step, id, "speak"))
+    meeting.later(3.2, lambda at: meeting.found("face", at, same_as="ann"))
+    meeting.play()
+
+    for speech, told in meeting.readings().items():
+        assert told[-1].reading == "noise", speech
+    assert {since for _, since in meeting.readings()} == {2.5, begins}
+
+
+@pytest.mark.parametrize("joined", [3.2, 4.2])
+@pytest.mark.parametrize(("to", "reading"), [((), "backchannel"), (("robot",), "backchannel"), (("bob",), "other")])
+def test_of_one_voice_that_two_tell_at_once_it_is_decided_by_what_is_known_of_it(
+    to: tuple[str, ...], reading: str, joined: float
+) -> None:
+    meeting = of_two_ids()
+    meeting.begins("face", "speak", 3.0)
+    told = Utterance(actor="ann", id="v", text="", began=stamp(3.0), at=stamp(3.0), final=False, to=to)
+    meeting.take(told, 3.0, key=keys.UTTERANCE)
+    meeting.begins("ann", "speak", 3.0)
+    meeting.later(joined, lambda at: meeting.found("face", at, same_as="ann"))
+    meeting.later(3.5, lambda at: meeting.ends("ann", "speak", at))
+    said = Utterance(actor="ann", id="v", text="uh-huh", began=stamp(3.0), ended=stamp(3.5), at=stamp(3.8), to=to)
+    meeting.later(3.8, lambda at: meeting.take(said, at, key=keys.UTTERANCE))
+    meeting.play()
+
+    [told_of] = meeting.readings().values()
+    assert [each.reading for each in told_of if each.reading != "open"][-1:] == [reading]
+    assert all(each.actor == "ann" for each in told_of if each.at.seconds > joined)
+
+
+def of_two_ids() -> Meeting:
+    """Ann, by two ids, and bob, where words are told; the robot says something to ann from 2.0 to 6.0."""
+    meeting = Meeting(random.Random(0))
+    for at, id in ((0.0, "ann"), (0.0, "bob"), (1.0, "face")):
+        meeting.found(id, at)
+    said = Utterance(actor="bob", id="u", text="so", began=stamp(0.1), at=stamp(1.0))
+    meeting.take(said, 1.0, key=keys.UTTERANCE)
+    for id in ("ann", "face"):
+        meeting.take(request_event("adjacency_pair", 2.0, request=f"b/{id}", block="b", turn="b", responder=id), 2.0)
+    meeting.begins(ROBOT, "speak", 2.0)
+    meeting.later(6.0, partial(meeting._is_silent, "b", "ended"))
+    return meeting

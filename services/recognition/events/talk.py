@@ -298,31 +298,37 @@ class Talk(KindRecognizer):
         goes_on: what they say by that id goes on. What both ids have said at one time, two reporters have told.
         """
         self.person_back()
-        before = other._conversation.exchange.pair
-        self._conversation.exchange.pair.take_over(before, self.id, other.id)
+        self._conversation.exchange.pair.take_over(other._conversation.exchange.pair, self.id, other.id)
         for speech in other.speeches.in_order():
-            is_in_line = any(each is speech for _, each in other._line)
-            is_open = is_in_line or other._conversation.listener.listens_to(speech.part)
+            is_open = other._is_undecided(speech.since)
             speech.actor = self.id
-            if speech.until is None and not goes_on:
-                speech.until = at
+            speech.until = at if speech.until is None and not goes_on else speech.until
             if self.speeches.has_said(speech.since, speech.until, speech):
                 self._scene.forget_spoken(speech)
-                if is_open and self.speeches.find(speech.since) is None:
-                    self._writer.decide_interjection(self.id, speech.since, "noise", at)
+                own = self.speeches.find(speech.since)
+                is_aside = own is not None and bool(own.named) and not own.is_to(self._scene.robot)
+                if is_open and (is_aside or not self._is_undecided(speech.since)):
+                    self._writer.decide_interjection(self.id, speech.since, "other" if is_aside else "noise", at)
                 continue
             self.speeches.remember(speech)
             if is_open:
                 self._begin_again(speech)
         self.go_on(at)
 
+    def _is_undecided(self, since: Seconds) -> bool:
+        """True if it is not decided yet what the person has begun to say at `since`."""
+        sign = self._conversation.listener.sign
+        in_line = any(isinstance(each, OwnSpeech) and each.since == since for _, each in self._line)
+        return in_line or (sign is not None and any(each.since == since for each in sign.speeches))
+
     def _begin_again(self, speech: OwnSpeech) -> None:
         """Put a speech in line, in its place."""
         since, until, speech.is_heard, speech.is_decided = speech.since, speech.until, False, False
         speech.part = SignPart("speak", since, speech.part.confidence, words=speech.words)
         self._line.insert(self._place(since), (since, speech))
-        if until is not None:
-            self._line.insert(self._place(until), (until, self._end_of(speech, until)))
+        if until is not None:  # it is over before the next begins, be it in this very instant
+            place = self._place(max(since, nextafter(until, -inf)))
+            self._line.insert(place, (until, self._end_of(speech, until)))
 
     def person_back(self) -> None:
         """Take the person's return: the robot may be speaking, or may have fallen silent meanwhile."""
@@ -374,13 +380,10 @@ class Talk(KindRecognizer):
             self.take(at, lambda talk: talk.exchange.pair.robot_says(at))
 
     def robot_stops(self, action: Action, at: Seconds) -> None:
-        if not self.is_under_way:
-            return
-        match action:
-            case "speak":
-                self.take(at, lambda talk: talk.robot_falls_silent(at))
-            case "nod" | "shake" | "point":
-                self.take(at, lambda talk: talk.robot_gesture_ends(action, at))
+        if self.is_under_way and action == "speak":
+            self.take(at, lambda talk: talk.robot_falls_silent(at))
+        elif self.is_under_way and action in ("nod", "shake", "point"):
+            self.take(at, lambda talk: talk.robot_gesture_ends(action, at))
 
     def withdraw(self, event: OngoingEvent, at: Seconds, *, is_orphan: bool) -> None:
         """Withdraw a pair of the robot.
@@ -446,11 +449,8 @@ class Talk(KindRecognizer):
         return speech.is_decided or (speech.to is not None and not may_be_noise)
 
     def _queue(self, at: Seconds, speech: OwnSpeech) -> None:
-        if (
-            self._line
-            or not self._is_known(speech)
-            or (speech.is_to(self._scene.robot) and self._waits_for_others(at))
-        ):
+        waits = speech.is_to(self._scene.robot) and self._waits_for_others(at)
+        if self._line or waits or not self._is_known(speech):
             self._line.append((at, speech))
         else:
             self._tell(speech)
