@@ -216,9 +216,8 @@ class Coder:
         sets = [*self._together(signs)]
         may_be_answered = turn.kind == "asks" or side.asked is not None
         for number, sign in enumerate(sets):
-            goes_on = [
-                each for each in sign if each.until > turn.until and (each.action == "speak" or may_be_answered)
-            ]  # fmt: skip
+            answers_too = may_be_answered and not found  # a gesture answers nothing that is answered
+            goes_on = [each for each in sign if each.until > turn.until and (each.action == "speak" or answers_too)]
             following = sets[number + 1][0].since if number + 1 < len(sets) else (1e9, 0)
             over = max(each.until for each in every if sign[0].since <= each.since <= sign[-1].until)
             late = [each for each in sign if self._is_told_late(each, following, over)]
@@ -235,7 +234,7 @@ class Coder:
                 if not parts and not answers and each not in corrected
                 and each.words not in LISTENING and self._is_last(each)
             ]  # fmt: skip
-            if any(each.action == "speak" for each in answers) or (answers and not found):
+            if answers:
                 found.append(answers[0])
                 is_listening = is_brief
             else:
@@ -486,8 +485,8 @@ def is_noise(one: Span, timeline: Timeline) -> bool:
 
 
 def company(speech: Span, timeline: Timeline) -> list[str]:
-    """Others who are there when somebody speaks."""
-    at = speech.since[0]
+    """Others who are there when somebody is known to speak. Words alone: who is lost when they come was so before."""
+    at = _known(speech)[0]
     gone = {
         each.who for each in timeline.away
         if each.until[0] - each.since[0] >= FACE_GRACE and each.since[0] + FACE_GRACE + ROUND < at < each.until[0]

@@ -4,8 +4,9 @@ Takes nothing from the code that it judges. Definitions: docs/connection-events.
 words"; docs/recognition.md, "Backchannel".
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
+from math import inf
 
 from msgspec import Struct
 
@@ -16,6 +17,7 @@ from tests.recognition.coder import (
     ROUND,
     WORDS_AFTER,
     WORDS_WAIT,
+    Coded,
     has_spoken_since,
     is_noise,
     longest_sound,
@@ -44,8 +46,8 @@ class Into(Struct):
     is_beside: bool
 
 
-def judged(timeline: Timeline, told: list[Interjection]) -> Iterator[str]:
-    """What is told of them and is not so."""
+def judged(timeline: Timeline, told: list[Interjection], events: Sequence[Coded]) -> Iterator[str]:
+    """What is told of them and is not so. events: those that are coded."""
     lives: dict[tuple[str, float], list[Interjection]] = {}
     for each in told:
         lives.setdefault((each.actor, round(each.since.seconds, 5)), []).append(each)
@@ -65,7 +67,7 @@ def judged(timeline: Timeline, told: list[Interjection]) -> Iterator[str]:
     into = {(one.speech.who, round(one.speech.since[0], 5)): one for one in _into(timeline)}
     for key, one in into.items():
         life = lives.get(key, [])
-        coded = _reading(one, timeline)
+        coded = _reading(one, timeline, _answered_since(one, events))
         last = life[-1].reading if life else ""
         if one.is_beside and timeline.tells == "late":
             coded = {*coded, ""}  # to whom it is may be known when the robot is silent
@@ -115,8 +117,21 @@ def _goes_with_words_before(gesture: Span, turn: Turn, timeline: Timeline) -> bo
     )  # fmt: skip
 
 
-def _reading(one: Into, timeline: Timeline) -> set[str]:
-    """What it is. Where two are right it is known in one instant, or too late for one that listens."""
+def _answered_since(one: Into, events: Sequence[Coded]) -> float:
+    """When the person's own answer to the robot's turn began; infinite: there is none."""
+    answered = (
+        one.turn.until[0] + each.delay for each in events
+        if each.initiator == ROBOT and each.responder == one.speech.who and each.started == one.turn.since[0]
+        and each.delay is not None and not each.answered_by
+    )  # fmt: skip
+    return next(answered, inf)
+
+
+def _reading(one: Into, timeline: Timeline, answered: float) -> set[str]:
+    """What it is. Where two are right it is known in one instant, or too late for one that listens.
+
+    answered: when the answer to the turn began: a gesture later than that, and than the speech, is none.
+    """
     speech, turn, known = one.speech, one.turn, one.speech.known
     since, until, over = speech.since[0], speech.until[0], one.until[0]
     by_words = "backchannel" if speech.words in LISTENING else "interruption"
@@ -139,7 +154,8 @@ def _reading(one: Into, timeline: Timeline) -> set[str]:
         and not _goes_with_words_before(each, turn, timeline)
     ]  # fmt: skip
     is_long = speech.seconds > WORDS_WAIT + ROUND and wait < over  # it has been one that interrupts before
-    is_of_answer = not is_long and turn.kind == "asks" and any(turn.until < each.until for each in beside)
+    goes_on = [min(since, each.since[0]) for each in beside if turn.until < each.until]
+    is_of_answer = not is_long and turn.kind == "asks" and any(each <= answered + ROUND for each in goes_on)
     if is_of_answer and not one.is_beside and not outlasts:
         decided = turn.until if turn.is_aborted else max(turn.until, (wait, LAST))  # a cut decides at once
         return {"answer", by_words if known is not None and known <= decided else "noise"}

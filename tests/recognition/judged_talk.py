@@ -26,7 +26,8 @@ def with_joins(seed: int) -> tuple[int, list[str]]:
 def judged(timeline: Timeline) -> tuple[int, list[str]]:
     """Number of events of a timeline, and what only one of recognition and the coders has."""
     log = timeline.told()
-    count, differing = only_one_has(rounded(as_told(log.events)), rounded(Coder(timeline).events()))
+    coded = Coder(timeline).events()
+    count, differing = only_one_has(rounded(as_told(log.events)), rounded(coded))
     differing += floor_coder.judged(timeline, log.floors)
     differing += log.misnamed()
-    return count, [*differing, *interjection_coder.judged(timeline, log.interjections)]
+    return count, [*differing, *interjection_coder.judged(timeline, log.interjections, coded)]

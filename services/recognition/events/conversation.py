@@ -109,9 +109,7 @@ class Dialogue:
         if not self.exchange.is_before_question(at):
             self.exchange.human_turn("speak", at, speech.confidence)
             if self.robot_speaks_since is not None and at < self.robot_speaks_since:
-                self.exchange.pair.robot_begins(
-                    "speak", self.robot_speaks_since
-                )  # what the robot says now is the answer
+                self.exchange.pair.robot_begins("speak", self.robot_speaks_since)  # which is the answer
 
     def falls_silent(self, at: Seconds) -> None:
         if self._speech is None:
@@ -124,8 +122,8 @@ class Dialogue:
         """Take a nod, a shake or a point of the person."""
         sign = self.listener.sign
         if self._speech is not None and (sign is None or not sign.going_on("speak")):
-            return  # it goes with the person's own words, and says nothing more
-        if self.robot_holds_floor or (sign is not None and sign.until is None):
+            self.listener.goes_with_words(SignPart(action, at, confidence))
+        elif self.robot_holds_floor or (sign is not None and sign.until is None):
             self.listener.begins(SignPart(action, at, confidence))
         elif not self.exchange.pair.human_begins(action, at, confidence):
             self.exchange.pair.answers_late(action, at, confidence)

@@ -47,13 +47,15 @@ class Listener:
         self._backchannel = Backchannel(writer, limit=config.backchannel_limit)
         self.sign: ListenerSign | None = None
         """What the person does in the robot's turn, as long as it is not decided what it is."""
+        self._interrupting = ListenerSign([])
+        """The sign that has taken the floor: as long as the turn goes on, words may show that it was a listener's."""
 
     # -- a sign -------------------------------------------------------------------------------------------------
 
     def begins(self, part: SignPart, *, beside: bool = False) -> None:
         """Take a part of the sign that goes on, or of a new one. beside: the robot speaks to others."""
         self.next_begins()
-        self._joins(part, beside=beside)
+        self._joins([part], beside=beside)
         self.judge(part.since)  # what is told late may have its words
 
     def next_begins(self) -> None:
@@ -61,10 +63,15 @@ class Listener:
         if self.sign is not None:
             self._has_no_words(self.sign, self._writer.now)
 
-    def _joins(self, part: SignPart, *, beside: bool = False) -> None:
+    def goes_with_words(self, part: SignPart) -> None:
+        """Take a gesture beside words that have the floor: it says nothing, unless these turn out a listener's."""
+        if self._interrupting.going_on("speak"):
+            self._interrupting.parts.append(part)
+
+    def _joins(self, parts: Sequence[SignPart], *, beside: bool = False) -> None:
         if self.sign is None:
             self.sign = ListenerSign([], is_beside=beside)
-        self.sign.parts.append(part)
+        self.sign.parts += parts
         self.sign.is_wordless = False  # this one's words may come
 
     def listens_to(self, part: SignPart) -> bool:
@@ -85,10 +92,9 @@ class Listener:
 
     def ends(self, action: Action, at: Seconds) -> None:
         """End an action of the person."""
-        if self.sign is not None:
-            for part in self.sign.going_on(action):
-                part.until = at
-            self.judge(at)
+        for part in (*self._interrupting.parts, *(self.sign.parts if self.sign is not None else ())):
+            part.until = at if part.until is None and part.action == action else part.until
+        self.judge(at)
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         if self.sign is not None and self.sign.outlasting is not None:
@@ -134,10 +140,8 @@ class Listener:
         sign = self.sign
         if sign is None:
             return
-        speeches = sign.speeches
-        interrupts = next((speech for speech in speeches if self._is_listening(speech) is False), None)
-        is_heard = all(map(self._asks_for_nothing, speeches))
-        is_known = not self._scene.is_worded or sign.is_wordless or is_heard
+        interrupts = next((speech for speech in sign.speeches if self._is_listening(speech) is False), None)
+        is_known = not self._scene.is_worded or sign.is_wordless or all(map(self._asks_for_nothing, sign.speeches))
         if interrupts is not None:
             self._takes_floor(interrupts, at, "interruption")
         elif is_known:
@@ -192,10 +196,11 @@ class Listener:
             is_into_words = in_turn or self._scene.robot_says(speech.since, at)
             self._is_turn(speech, "interruption" if is_into_words else "answer", at)
         elif listens and (is_new or self._exchange.pair.was_listening(speech.since)):
-            if speech.until is None:
-                self._joins(speech)
+            sign = self._interrupting if speech in self._interrupting.parts else ListenerSign([speech])
+            if sign.until is None:
+                self._joins(sign.parts)
             else:
-                self._listens(ListenerSign([speech]), speech.until)
+                self._listens(sign, sign.until)
         elif listens and in_turn and (taken == "backchannel" or (taken and self._exchange.pair.is_interrupted)):
             self._tell(speech, at)  # it is that of the nod beside it, or more of the answer, which have been told
 
@@ -228,13 +233,16 @@ class Listener:
     def _takes_floor(self, part: SignPart, at: Seconds, reading: InterjectionReading) -> None:
         """Take a part of the sign as a turn of the person since it began. Speech before it was a listener's."""
         beside: list[Seconds] = []
-        for speech in self.sign.speeches if self.sign is not None else ():
+        sign, self.sign = self.sign, None
+        assert sign is not None
+        for speech in sign.speeches:
             if speech.since <= part.since and speech is not part:
                 self._tell(speech, at)
             elif speech is not part:  # it goes on beside the gesture that answers, and is of that answer
                 self._read(speech.since, reading, at)
                 beside.append(speech.since)
-        self.sign = None
+        if not self._exchange.pair.is_interrupted:
+            self._interrupting = sign
         self._is_turn(part, reading, at, beside)
 
     def _is_turn(

@@ -111,6 +111,8 @@ class Talk(KindRecognizer):
     def _decided_at(self, speech: OwnSpeech) -> Seconds:
         """Time at which the first speech in line is decided."""
         scene, listener, since, until = self._scene, self._conversation.listener, speech.since, speech.until
+        if speech.to is not None and speech.sound == "speech":
+            return since + ROUNDING  # who has been asked, and begins in this very instant, comes first
         is_known = says_words(speech.words) or (self.id, since) in scene.echoes
         is_sign = self._conversation.is_into_turn(since)  # it holds the robot, which waits for no more than it has to
         if until is None:
@@ -226,11 +228,8 @@ class Talk(KindRecognizer):
         known, over = speech.words, (at if speech.until is None else speech.until) + WORDS_AFTER
         is_in_time = at <= max(since + WORDS_WAIT, over if speech.is_beside else since) + ROUNDING
         # What the line holds may have ended the robot's turn, so that only the speech knows that it is not into that.
-        if (
-            speech.sound == "unsure"
-            and says_words(known)
-            and not ((speech.is_into_turn or speech.is_beside) and self._is_into_words(speech) and not is_in_time)
-        ):
+        is_late = (speech.is_into_turn or speech.is_beside) and self._is_into_words(speech) and not is_in_time
+        if speech.sound == "unsure" and says_words(known) and not is_late:
             self._scene.decide(speech, at)
         # What has been waited for was known when the speech began. The line waits for no words of who is alone.
         if is_in_time and speech.company and any(each is speech for _, each in self._line):
@@ -395,19 +394,16 @@ class Talk(KindRecognizer):
 
     def abort(self, at: Seconds, *, turn: str) -> None:
         # Who has interrupted the turn has done so before that, also if it is known only now, and told of `at`.
-        cut_off, since = QuestionEnd(lambda talk: talk.abort(at, turn=turn), is_cut_off=True), nextafter(at, inf)
-        if self._line or (self.asked_since < inf and self._scene.is_contested(self.id, since)):
-            self._line.append((since, cut_off))
-        else:
-            cut_off.step(self._conversation)
+        self._take_in_order(nextafter(at, inf), lambda talk: talk.abort(at, turn=turn), is_cut_off=True)
 
     def block_ended(self, block: str, at: Seconds, *, aborted: bool) -> None:
         self.take(at, lambda talk: talk.block_ended(block, at, aborted=aborted))
 
-    def _take_in_order(self, at: Seconds, step: Step) -> None:
+    def _take_in_order(self, at: Seconds, step: Step, *, is_cut_off: bool = False) -> None:
         """Take what ends a question of the robot, after what somebody else may have answered before."""
-        if self._line or (self.asked_since < inf and self._waits_for_others(at)):
-            self._line.append((at, QuestionEnd(step)))
+        waits = self._scene.is_contested(self.id, at) if is_cut_off else self._waits_for_others(at)
+        if self._line or (self.asked_since < inf and waits):
+            self._line.append((at, QuestionEnd(step, is_cut_off)))
         else:
             step(self._conversation)
 
@@ -441,16 +437,17 @@ class Talk(KindRecognizer):
         return is_into_words and (may_be if speech.to is None else speech.is_to(self._scene.robot))
 
     def _is_known(self, speech: OwnSpeech) -> bool:
-        """True if it is known to whom a speech in line is, and that it is no cough.
+        """True if it is known to whom a speech in line is, that it is no cough, and who else speaks in that instant.
 
         Of who is alone with it the conversation judges, if it is into the robot's words.
         """
         may_be_noise = speech.sound == "unsure" and (speech.company or not self._is_into_words(speech))
-        return speech.is_decided or (speech.to is not None and not may_be_noise)
+        may_be_second = self._writer.now <= speech.since and bool(self._scene.questions.keys() - {self.id})
+        return speech.is_decided or (speech.to is not None and not may_be_noise and not may_be_second)
 
     def _queue(self, at: Seconds, speech: OwnSpeech) -> None:
-        waits = speech.is_to(self._scene.robot) and self._waits_for_others(at)
-        if self._line or waits or not self._is_known(speech):
+        is_contested = speech.is_to(self._scene.robot) and self._waits_for_others(at)
+        if self._line or is_contested or not self._is_known(speech):
             self._line.append((at, speech))
         else:
             self._tell(speech)
