@@ -376,9 +376,6 @@ def _part(raw: dict[str, Any], source: str, path: str) -> Part:
         advice = f"give each part exactly one of {', '.join(_KINDS)}"
         raise InputRefused(Fault(reason=f"a part holds {found}", where=_place(source, path), advice=advice))
     part: Part = _converted(raw, kinds[0], source, path)
-    if isinstance(part, Refer) and not part.refer:
-        advice = "give the id of an object, or a list of ids"
-        raise InputRefused(Fault(reason="it names no object", where=_place(source, f"{path}.refer"), advice=advice))
     return part
 
 

@@ -291,8 +291,6 @@ PART = {"say": "hello"}
         ({"turn_status": "full", "parts": [{}]}, "$.parts[0]", "nothing", "exactly one of"),
         ({"turn_status": "full", "parts": [{"say": "x", "refer": "y"}]}, "$.parts[0]", "2 of them", "exactly one"),
         ({"turn_status": "full", "parts": [{"refer": 7}]}, "$.parts[0].refer", "Expected `str | array`", ""),
-        ({"turn_status": "full", "parts": [PART, {"refer": []}]}, "$.parts[1].refer", "names no object", "list of"),
-        ({"turn_status": "full", "parts": [{"refer": ""}]}, "$.parts[0].refer", "names no object", "list of"),
         ({"turn_status": "full", "parts": [{**PART, "to": "ann"}]}, "$.parts[0]", "`to`", "known: say"),
         ({"turn_status": "full", "parts": [{"refer": "x", "phrases": "it"}]}, "$.parts[0].phrases", "`array`", ""),
         (
