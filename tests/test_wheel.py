@@ -92,14 +92,14 @@ from engage_hri.services.control.torso.body import SimulatedBody
 
 
 class Head(SimulatedBody):
-    """A head without a body."""
+    """A head on a trunk, without arms."""
 
     def __init__(self):
         super().__init__()
-        joints = tuple(each for each in self.capabilities.joints if each.part == "head")
+        joints = tuple(each for each in self.capabilities.joints if each.part in ("head", "torso"))
         types = ("gaze", "gazeShift", "head")
         self.capabilities = replace(
-            self.capabilities, body="head", types=types, parts=("head",), joints=joints, reach=0.0
+            self.capabilities, body="head", types=types, parts=("head", "torso"), joints=joints, reach=0.0
         )
 
     def state(self):
