@@ -122,7 +122,7 @@ def _out(
 def turned(behavior: BlockBehavior, now: Circumstances) -> tuple[Radians, Radians]:
     """Turn and lean of the body once a behavior has begun: it goes where a shift turns it. Raises Impossible."""
     turn, lean = now.tracks["torso"]
-    if isinstance(behavior, GazeShift) and choreography.turns_trunk(behavior):
+    if choreography.turns_trunk(behavior):
         turn, _ = look_at(behavior, joints.summed(now.tracks), now.world, now.mounting)
         turn = joints.own_turn(turn)
     return turn, lean
