@@ -15,7 +15,9 @@ from engage_hri.schemas.behaviors import (
     Synchronize,
     Timing,
 )
+from engage_hri.schemas.check import problems
 from engage_hri.schemas.fragments import TurnFragment
+from engage_hri.schemas.references import SyncRef
 from engage_hri.services.generation.turns.continuation import Continuation
 from tests.generation.emitted import LOOK, POINT, Made, block, by_id, lines, reference, speech
 
@@ -345,6 +347,17 @@ def test_the_first_look_waits_until_what_the_eyes_have_just_come_to_was_seen(loo
     fragment = TurnFragment(id="f", turn_status="full", behaviors=(look, speech("s")))
 
     assert lines(block(fragment, before=EYES_ON_ANN), "eyes-rest") == waits
+
+
+@pytest.mark.parametrize("seconds", [5.684341886080802e-14, 1e-5, 1 / 3])
+def test_a_wait_of_any_length_can_be_read(seconds: float) -> None:
+    fragment = TurnFragment(id="f", turn_status="full", behaviors=(Gaze(id="look", target="piece"), speech("s")))
+
+    planned = block(fragment, before=Continuation(seen_after=seconds, eyes_on="ann"))
+
+    assert not list(problems(planned))
+    (wait,) = (each for each in planned.constraints if each.id == "eyes-rest")
+    assert SyncRef.parse(wait.operators[0].ref).offset == seconds
 
 
 def test_the_look_of_a_reference_and_that_of_the_turn_wait_too() -> None:

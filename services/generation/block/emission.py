@@ -40,7 +40,7 @@ from engage_hri.schemas.behaviors import (
 from engage_hri.schemas.blocks import Block
 from engage_hri.schemas.documents.prosody import marked_up
 from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
-from engage_hri.schemas.references import SyncRef, type_name
+from engage_hri.schemas.references import BLOCK_ITSELF, SyncRef, type_name
 from engage_hri.schemas.text import tokens, word_count
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.generation.block.ordering import ordered
@@ -256,7 +256,8 @@ class Emission:
             return
         source = next((id for id, parts in self.parts.items() if parts.gaze == first.id), first.id)
         if not self.rewriting.is_timed(source, self.named):
-            rested = after(f"bml:start+{self.before.seen_after:g}", f"{first.id}:start")
+            seen = SyncRef(behavior=BLOCK_ITSELF, sync="start", offset=self.before.seen_after)
+            rested = after(str(seen), f"{first.id}:start")
             self.constraints.append(Constraint(id=self.names.fresh("eyes-rest"), operators=(rested,)))
 
     def _speeches(self) -> list[str]:

@@ -16,6 +16,7 @@ from engage_hri.schemas.behaviors import (
     Timing,
 )
 from engage_hri.schemas.fragments import ReferenceChoice, TurnFragment
+from engage_hri.schemas.references import SyncRef
 from engage_hri.schemas.units import Seconds
 from engage_hri.schemas.world import each_of
 from engage_hri.services.generation.block.rewriting import Operator, Point, Replacement
@@ -211,7 +212,7 @@ def as_in_the_figure(parts: Parts, preceding: str, earlier: str, is_timed: bool,
         if point and follows:
             operators.append(after(f"{gaze}:start", f"{point}:start"))
     if point:
-        operators.append(same(f"{gaze}:stroke+{lead:g}", f"{point}:stroke_start"))
+        operators.append(same(str(SyncRef(behavior=gaze, sync="stroke", offset=lead)), f"{point}:stroke_start"))
         if phrase:
             operators.append(same(f"{point}:stroke_end", f"{phrase}:start"))
     if phrase and preceding:
