@@ -6,8 +6,18 @@ from random import Random
 
 import pytest
 
-from engage_hri.schemas.behaviors import BlockBehavior, Gaze, GazeShift, Gesture, Pointing, Posture, PostureShift
+from engage_hri.schemas.behaviors import (
+    BlockBehavior,
+    Gaze,
+    GazeShift,
+    Gesture,
+    Head,
+    Pointing,
+    Posture,
+    PostureShift,
+)
 from engage_hri.schemas.body import EstimateItem, PlannedTime
+from engage_hri.services.control.config import Stall, Variability
 from engage_hri.services.control.contract.body import BehaviorRefused, MovementAuthority, Reached
 from engage_hri.services.control.testing import WORLD
 from engage_hri.services.control.torso.body import SimulatedBody
@@ -152,3 +162,17 @@ async def test_others_change_nothing_of_the_body() -> None:
     assert body.state() == before
     await look.task
     assert list(look.at)[-1] == "end"
+
+
+async def test_a_stall_to_come_is_not_rehearsed():
+    """Else whoever stalls is expected to go on when the next behavior begins, and that may wait for its end."""
+    body = SimulatedBody(deviations=Variability(stall=(Stall(part="head", before="stroke", seconds=3.0),)))
+    body.see(WORLD)
+    shake = Performed(body, Head(id="shake", lexeme="SHAKE"))
+    await asyncio.sleep(0.15)
+    natural = {each.to: each.natural for each in body.estimate(shake.behavior, None, WORLD).phases}
+
+    for begins in (0.5, 2.0, 20.0):
+        [told] = body.rehearse([shake.item()], WORLD, [to_begin(Gaze(id="look", target=TARGETS[0]), begins)])
+        assert {each.to: each.natural for each in told.phases} == pytest.approx(natural, abs=EXACT)
+    await shake.task

@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from engage_hri.schemas.behaviors import Gaze, Pointing, Speech
+from engage_hri.schemas.behaviors import Gaze, Pointing, Posture, Speech
 from engage_hri.services.control.config import ControlConfig, Displaced, Slow, Stall, Variability
 from engage_hri.services.control.contract.body import BehaviorRefused, BodyFailed, Reached, Spoke
 from engage_hri.services.control.contract.variability import Deviations, configured, is_lost, normal
@@ -88,6 +88,31 @@ async def test_an_overheated_motor_fails_its_behavior_and_the_arm_goes_home():
 
     assert stage.passed == ["start", "ready", "stroke_start"]
     assert poses_agree(body.state().pose, home)
+
+
+TURN = Posture(id="turn", lexeme="TURN_LEFT", part="WHOLEBODY")
+"""Its ready and its stroke are one place of its way: a fault before the stroke comes before both."""
+
+
+async def test_an_overheated_trunk_fails_its_posture_half_way():
+    body = body_with(overheated=("torso",))
+    natural = {phase.to: phase.natural for phase in body.estimate(TURN, None, WORLD).phases}
+    begin = asyncio.get_running_loop().time()
+    with pytest.raises(BodyFailed, match="overheated"):
+        async with asyncio.timeout(60.0):
+            await performed(body, TURN)
+
+    assert natural["stroke"] == 0.0
+    assert asyncio.get_running_loop().time() - begin < natural["ready"]
+
+
+async def test_a_posture_that_stalls_before_its_stroke_goes_on_after_the_stall():
+    perfect = times(await performed(body_with(), TURN))
+    before = asyncio.get_running_loop().time()
+    async with asyncio.timeout(60.0):
+        at = times(await performed(body_with(stall=(Stall(part="torso", before="stroke", seconds=2.0),)), TURN))
+
+    assert 2.0 < at["stroke"] - before - perfect["stroke"] < 2.6
 
 
 async def test_a_silent_voice_reports_what_nobody_hears():

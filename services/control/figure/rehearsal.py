@@ -83,7 +83,9 @@ def beside(torso: Torso, clock: ClockOfCopy, world: World) -> Torso:
         track.motion, track.trunk = copied(track.motion), other.tracks["torso"]
     runs = {id(run): copy(run) for run in torso.runs.values()}
     for run in runs.values():
-        run.motion, run.bell, run.pending = copied(run.motion), clock, list(run.pending)
+        run.motion, run.bell = copied(run.motion), clock
+        # The body does not know of a fault before it has come: in the copy nobody would end a stall.
+        run.pending = [point for point in run.pending if point.is_told]
         run.authority, run.gate = _alike(run), inf
     other.runs = {part: runs[id(run)] for part, run in torso.runs.items()}
     other.base = None

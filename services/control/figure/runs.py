@@ -181,18 +181,21 @@ class Run(moving_parts.Run):
     def _mark_faults(self, motion: Motion, now: Seconds) -> None:
         """Mark the faults that are due on the path of a motion, half-way from here. One that comes too late to stop
         there does not happen."""
-        for number, point in [each for each in enumerate(self.pending) if each[1].sync in FAULTS]:
+        for point in [each for each in self.pending if each.sync in FAULTS]:
             path, here = motion.path, motion.s(now)
             if point.sync in path.marks:
                 continue
-            before = path.marks[next(each.sync for each in self.pending[number:] if each.sync not in FAULTS)]
+            following = self.pending[self.pending.index(point) :]
+            before = path.marks[next(each.sync for each in following if each.sync not in FAULTS)]
             earlier = max((mark for mark in path.marks.values() if mark < before), default=0.0)
             half = (max(earlier, here) + before) / 2
             rate = motion.rate(now)
             soonest = here + rate * rate / (2 * path.gentlest_brake)
             if not motion.can_stop_at(half, now):
                 half = soonest
-            if half > before:
-                self.pending = [each for each in self.pending if each is not point]
-            else:
+            self.pending.remove(point)
+            if half <= before:
                 motion.path = path.marked(point.sync, half)
+                # It comes before all that lies behind it: the ready of a posture, too, which is one with its stroke.
+                passed = [each for each in self.pending if motion.path.marks.get(each.sync, inf) < half]
+                self.pending.insert(len(passed), point)
