@@ -67,10 +67,13 @@ def _without_the_lost(case: Case, block: Reading, by: float) -> Reading:
 
 
 def _is_gone(case: Case, term: Term, by: float) -> bool:
+    """True if it was known by then that this point will not come: its behavior is lost, or its block has ended."""
+    if term.place in case.times:
+        return False
     block, behavior = term.place[:2]
     told = [each.at.seconds for each in case.record.warnings(block) if each.behavior == behavior and each.at]
-    is_lost = (block, behavior) in case.lost and term.place not in case.times
-    return is_lost and not (told and max(told) > by + EXACT)
+    is_lost = (block, behavior) in case.lost and not (told and max(told) > by + EXACT)
+    return is_lost or any(each.at <= by + EXACT for each in case.record.ends.get(block, []))
 
 
 def _length(case: Case, done: Done) -> Iterator[Finding]:

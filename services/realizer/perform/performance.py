@@ -138,6 +138,9 @@ class BlockPerformance(Neighbor):
         )
         self._untold: list[News] = []
         self._needs_replan = False
+        self._is_informed = False
+        """True once it knows what has become by now of all that it is tied to. What it is told one by one before that
+        is no reason to begin: the next word may be that another tie is lost."""
 
     def containing(self) -> Containing:
         """Contain exceptions in the body of `with`: they end this block, and no other."""
@@ -173,6 +176,7 @@ class BlockPerformance(Neighbor):
                     self._begin_among_others()
                     self.tell_stuck()
                     self._take_out(self._live.taken_out)
+                    self._is_informed = True
                     self.take_in()
                     self._shared.rehearse(self.plan, but=self)
                     ending = await asyncio.shield(self._ending)  # others wait for it, too
@@ -315,6 +319,8 @@ class BlockPerformance(Neighbor):
         if is_held != self._is_held:
             self._is_held = is_held
             self.decisions.hold_up(is_held, self.bus.now())
+            if not is_held:  # All comes at another time beside the others than was rehearsed.
+                self._shared.rehearse(self.decisions.plan)
 
     def hold(self, behaviors: Collection[str] | None) -> None:
         """Hold these behaviors, and no others, from now on. None: all of them."""
@@ -383,7 +389,8 @@ class BlockPerformance(Neighbor):
             with self.containing():
                 news()
                 self._tell()
-                self._advance()
+                if self._is_informed:
+                    self._advance()
 
     def _advance(self) -> None:
         self._afterwards.stop()
