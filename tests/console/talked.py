@@ -185,7 +185,7 @@ def _exchanges(phrases: tuple[str, ...], told: list[dict[str, Any]], begin: floa
 
 
 def _main(count: int, pictures: Path | None) -> None:
-    with TemporaryDirectory() as folder:
+    with TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         try:
             found = asyncio.run(talked(Path(folder), SAID[:count], pictures))
         finally:

@@ -64,7 +64,8 @@ async def found(pictures: Sequence[Picture], patience: float = 600.0) -> list[li
     site = web.TCPSite(runner, "127.0.0.1", 0)
     await site.start()
     try:
-        with tempfile.TemporaryDirectory() as folder, browser.running(Path(folder)) as port:
+        # Chromium may still write there when it has been told to end.
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder, browser.running(Path(folder)) as port:
             async with browser.at_port(port) as running, running.page() as page:
                 host, where = runner.addresses[0][:2]
                 await page.go(f"http://{host}:{where}/")
