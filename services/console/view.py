@@ -18,7 +18,7 @@ from engage_hri.schemas.fragments import Claim, HeadOwner, StudyCondition
 from engage_hri.schemas.messages import Message
 from engage_hri.schemas.participants import PeerAlive, PeerGone
 from engage_hri.schemas.perception import ActionBegan, ActionEnded, ActorFound, ActorLost, Utterance
-from engage_hri.schemas.recognition import ConnectionEvent, SamePeople, Statistics, WindowStatistics
+from engage_hri.schemas.recognition import ConnectionEvent, Floor, SamePeople, Statistics, WindowStatistics
 from engage_hri.schemas.text import joined
 from engage_hri.schemas.units import Seconds
 from engage_hri.services.reports.in_force import InForce
@@ -108,6 +108,8 @@ class Scene(Struct, frozen=True, kw_only=True):
     """Condition of the study."""
     warned: tuple[Warned, ...] = ()
     """Warnings of behaviors of the last blocks: each again for another behavior is no news."""
+    floor: Floor | None = None
+    """Who speaks, and to whom; None: recognition has not told."""
     faults_by: str = ""
     """Participant that switched them; empty: the configuration."""
 
@@ -147,6 +149,8 @@ def feed(scene: Scene, message: Message, at: Seconds) -> Scene:
             return replace(scene, owner=owner, waiting=waiting, left=None)
         case ConnectionEvent():
             return _event(scene, message, at)
+        case Floor():
+            return replace(scene, floor=message)
         case HeadOwner(owner=owner, waiting=waiting):
             return replace(scene, owner=owner, waiting=waiting, left=None)
         case Held(holds=holds, at=told):

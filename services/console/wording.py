@@ -12,6 +12,7 @@ from engage_hri.schemas import behaviors as of
 from engage_hri.schemas.behavior_types import TYPES, dialect_sync, same_instant
 from engage_hri.schemas.blocks import Block, Hold, WarningFeedback
 from engage_hri.schemas.fragments import Claim, TurnFragment
+from engage_hri.schemas.perception import Utterance
 from engage_hri.schemas.recognition import (
     ConnectionEvent,
     Floor,
@@ -83,6 +84,8 @@ def _give_or_take(error: Seconds | None) -> str:
     return f" ± {seconds(error)}" if error >= SEEN else ""
 
 
+SAME_SPEECH: Seconds = 0.5
+"""Seconds by which a recognizer may hear a speech begin at another time than a voice detector. Ours."""
 READINGS: dict[InterjectionReading, str] = {
     "open": "not decided yet",
     "backchannel": "as a listener",
@@ -97,6 +100,17 @@ def interjection(message: Interjection) -> str:
     """Words for what a person says into the robot's turn: `ann, into the turn: "wait" (takes the floor)`."""
     words = f'"{message.words}" ' if message.words else ""
     return f"{message.actor}, into the turn: {words}({READINGS[message.reading]})"
+
+
+def addressed(said: Utterance, floor: Floor | None, robot: str) -> str:
+    """Who says something, and to whom if it is not the robot alone: `ann (to ben)`. floor: as it was told last."""
+    speeches = () if floor is None else (*floor.speeches, *floor.ended)
+    own = [each for each in speeches if each.actor == said.actor and each.since.clock == said.began.clock]
+    apart = [abs(each.since.seconds - said.began.seconds) for each in own]
+    is_known = bool(apart) and min(apart) < SAME_SPEECH
+    to = own[apart.index(min(apart))].to if is_known else said.to
+    others = " and ".join("the robot" if each == robot else each for each in to)
+    return said.actor if set(to) <= {robot} else f"{said.actor} (to {others})"
 
 
 def floor(message: Floor, robot: str) -> str:

@@ -11,7 +11,7 @@ from engage_hri.schemas.check import problems
 from engage_hri.schemas.documents.json_codec import read
 from engage_hri.schemas.fragments import TurnFragment
 from engage_hri.schemas.perception import Utterance
-from engage_hri.schemas.recognition import ConnectionEvent
+from engage_hri.schemas.recognition import ConnectionEvent, Floor, FloorSpeech
 from engage_hri.schemas.units import Stamp
 from engage_hri.services.console.terminal.log import Telling, line
 from engage_hri.services.console.view import empty, feed
@@ -104,6 +104,24 @@ def test_the_log_tells_words_when_they_are_understood_and_events_once() -> None:
     assert [text and text.split("  ")[-1] for text in lines] == [
         None, 'ann: "hello"', "* adjacency pair, ann → robot (human): waiting", None,
     ]  # fmt: skip
+
+
+def test_the_log_tells_to_whom_others_than_the_robot_something_was_said() -> None:
+    began, later = Stamp("loop", 2.0), Stamp("loop", 4.0)
+    floors = {
+        to: Floor(at=later, ended=(FloorSpeech(actor="ann", since=Stamp("loop", 2.1), to=to, until=later),))
+        for to in ((), ("robot",), ("bob",), ("bob", "robot"))
+    }
+    said = Utterance(actor="ann", id="1", text="hello", began=began, at=later)
+
+    for to, floor in floors.items():
+        scene = feed(empty("robot", 0.0), floor, 4.0)
+        whom = {("bob",): " (to bob)", ("bob", "robot"): " (to bob and the robot)"}.get(to, "")
+        assert line(said, scene, feed(scene, said, 4.0), 4.0, Telling()) == f'  0:04.0  ann{whom}: "hello"'
+    another = replace(said, began=Stamp("loop", 3.5))
+    assert line(another, scene, scene, 4.0, Telling()) == '  0:04.0  ann: "hello"'
+    told = replace(another, to=("bob",))
+    assert line(told, scene, scene, 4.0, Telling()) == '  0:04.0  ann (to bob): "hello"'
 
 
 def test_the_view_puts_words_where_they_were_said() -> None:

@@ -50,8 +50,8 @@ def _text(message: Message, before: Scene, after: Scene, at: Seconds, telling: T
     match message:
         case ActionBegan() | ActionEnded() | ActorFound() | ActorLost():
             return _action(message, before) if telling.actions else None
-        case Utterance(final=True, text=text, actor=actor) if telling.actions and text:
-            return f'{actor}: "{text}"'
+        case Utterance(final=True, text=text) if telling.actions and text:
+            return f'{wording.addressed(message, before.floor, before.robot)}: "{text}"'
         case SyncPointProgress(block=block) if telling.points and not block.startswith(OWN_BLOCKS):
             planned = "" if message.predicted is None else f" (planned {wording.seconds(message.predicted)})"
             return f"{block}:{message.behavior}:{message.sync} at {wording.seconds(message.time)}{planned}"
