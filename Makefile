@@ -23,12 +23,13 @@ test: style
 	tests=$$?; wait $$types && exit $$tests
 
 # The long share as well: real processes, sockets, browsers, the wheel, the site. `.ci/run` runs this.
-test-all: CHOSEN :=
+test-all: CHOSEN := -m "not many"
 test-all: test
 
-# And all random cases, of which the others try a share (tests/random_cases.py).
+# And all random cases, of which the others try a share (tests/random_cases.py, tests/long_share.py).
 test-long: PROFILE := long
-test-long: test-all
+test-long: CHOSEN :=
+test-long: test
 
 # What `make test` leaves out on most machines, and never has the time for: several machines on this one, which wants root,
 # and all of the contract on the mock-up of a Reachy Mini. CI does it each week.

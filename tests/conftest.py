@@ -20,7 +20,7 @@ from hypothesis import settings
 
 from engage_hri.services.bus.memory import MemoryHub
 from engage_hri.services.control.testing.plugin import virtual_loop
-from tests.long_share import TESTS, Left, Started, is_long
+from tests.long_share import TESTS, Left, Started, is_long, is_many
 from tests.longest import LONGEST
 from tests.skips import Skips
 
@@ -62,6 +62,7 @@ def pytest_configure(config: pytest.Config) -> None:
         "markers", "each_bus: runs on each kind of bus (shared=False: not with one session for all)"
     )
     config.addinivalue_line("markers", "long: left to `make test-all` (set by conftest: tests/long_share.py)")
+    config.addinivalue_line("markers", "many: left to `make test-long`, being more of the same")
     config.pluginmanager.register(Left(config), "left")
     config.pluginmanager.register(Bugs(), "bugs")
     config.pluginmanager.register(Started(), "started")
@@ -93,6 +94,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         place, cases[whole] = cases[whole], cases[whole] + 1
         if is_long(item.path, test, place=place, real_time="real_time" in marks, each_bus="each_bus" in marks):
             item.add_marker("long")
+            if is_many(item.path, test, place=place):
+                item.add_marker("many")
     places = {config.rootpath / "tests" / name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: (places.get(item.path, len(places)), item.path))
 

@@ -7,6 +7,9 @@ They wait for other processes, and few changes of the code touch what they guard
 `conftest.py` marks the long share with `long`: each test that is marked `real_time`, each in a file or folder below,
 and of some tests all cases but the first few. A test that is not long and starts a process fails, unless its file is
 in `SHORT_PROCESSES`. So no test of real processes makes `make test` slow unseen.
+
+Some of it is more of what the rest has: cases like the first few, and what is drawn by chance in large numbers. That
+is marked `many`, too. `make test-long` tries it, as it tries all random cases (`random_cases.py`).
 """
 
 import re
@@ -407,6 +410,23 @@ FIRST_CASES = {
 }
 """Tests of many cases that are alike and take long, by file: so many of them, the first, are not long."""
 
+MANY = {
+    "generation/test_again.py",
+    "hostile/test_attacks.py",
+    "growth",
+    "control/test_estimates_from_anywhere.py",
+    "control/mujoco/test_limits.py",
+    "recording/test_tiers_at_random.py",
+    "tangram/people/test_stochastic_task.py",
+    "scenario/test_appendix_b_varied.py",
+    "realizer/test_second_lives.py",
+    "recognition/test_memory.py",
+    "recognition/test_crowd.py",
+    "judge/test_judge.py",
+    "simulation/test_party.py",
+}
+"""Files and folders whose long tests are drawn by chance, or take hours of virtual time."""
+
 LONG_BUSES = {
     "group": "sessions of one process, with keys: they hear each other in memory; `zenoh` has the sockets",
     "shared": "one session for a whole process; `memory` has what it does within, `zenoh` what it does outside",
@@ -446,6 +466,13 @@ def is_long(path: Path, test: str, *, place: int = 0, real_time: bool, each_bus:
     on_long_bus = each_bus and case.rstrip("]").partition("-")[0] in LONG_BUSES
     is_one_of_many = place >= FIRST_CASES.get(name, {}).get(whole, inf)
     return name != SMOKE and (real_time or is_named or on_long_bus or is_one_of_many)
+
+
+def is_many(path: Path, test: str, *, place: int = 0) -> bool:
+    """Whether a test of the long share is more of what the rest of the tests has. test, place: as of `is_long`."""
+    file = path.relative_to(TESTS)
+    is_one_of_many = place >= FIRST_CASES.get(file.as_posix(), {}).get(test.partition("[")[0], inf)
+    return is_one_of_many or any(each.as_posix() in MANY for each in (file, *file.parents))
 
 
 @cache
@@ -519,7 +546,7 @@ class Left:
 
     def __init__(self, config: pytest.Config) -> None:
         self.tests, self.files, self._asked = 0, 0, config.option.markexpr == "not long"
-        self._is_rest_asked = config.option.markexpr == "long"
+        self._is_rest_asked = config.option.markexpr.startswith("long")
 
     def pytest_ignore_collect(self, collection_path: Path) -> bool | None:
         """Never asked for what is named on the command line."""

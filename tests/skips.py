@@ -93,7 +93,8 @@ def _is_whole(session: pytest.Session) -> bool:
     asked = config.option
     return (
         config.args_source is pytest.Config.ArgsSource.TESTPATHS
-        and asked.markexpr in ("", "long")  # all that is skipped for want of something is long (long_share.py)
+        # What is skipped for want of something is long, and not one of many cases (long_share.py).
+        and asked.markexpr in ("", "not many", "long and not many")
         and not (asked.keyword or asked.deselect or asked.ignore or asked.ignore_glob)
         and not getattr(asked, "lf", False)
         and not (session.shouldstop or session.shouldfail)

@@ -1,4 +1,4 @@
-"""Words of listeners by language: with them a person says "go on", and does not ask for the floor. Pure data.
+"""Words by language with which a person asks for nothing: those of listeners, who say "go on", and thanks. Pure data.
 
 A list for each language, because length alone misjudges both ways: "stop" is as short as "yes", and "yes, yes, okay"
 is as long as a question. "No" is in none of them: it may mean stop. Nor are words with which one begins to speak,
@@ -6,6 +6,7 @@ such as "well" and "but", nor thanks, with which one ends. What is part of many 
 """
 
 import re
+from collections.abc import Mapping
 from functools import lru_cache
 from unicodedata import normalize
 
@@ -47,12 +48,39 @@ BY_LANGUAGE = {
 }  # fmt: skip
 """Phrases of each language, with commas between them."""
 
+THANKS_BY_LANGUAGE = {
+    "en": "thanks, thank you, thank you kindly, many thanks, thx, ta, cheers, a lot, a bunch, so much, very much, "
+    "much appreciated, appreciate it, i appreciate it, no problem, never mind, well, well then, okay then, "
+    "all right then, right then, good then, fine then, for that, for your help, you've been very helpful, "
+    "that helps, that helped, that was helpful, helpful, it does, that does, that works, of you",
+    "de": "danke, danke schön, dankeschön, danke sehr, danke dir, danke ihnen, vielen dank, besten dank, "
+    "herzlichen dank, ich danke dir, ich danke ihnen, merci, na dann, also dann, gut dann, okay dann, nett, "
+    "von dir, von ihnen, das hilft, das hilft mir, das war hilfreich, hilfreich, für die hilfe, für deine hilfe",
+    "fr": "merci, merci beaucoup, merci bien, super, parfait, génial, c'est gentil, très bien, c'est bon",
+    "es": "gracias, muchas gracias, mil gracias, muy amable, muy bien, perfecto, genial, qué bien, qué bueno",
+    "it": "grazie, grazie mille, molte grazie, tante grazie, perfetto, ottimo, molto bene, molto gentile",
+    "pt": "obrigado, obrigada, muito obrigado, muito obrigada, muito bem, muito bom, perfeito, ótimo",
+    "nl": "bedankt, dank je, dank je wel, dankjewel, dank u, dank u wel, hartelijk bedankt, fijn, mooi, top",
+    "ru": "спасибо, большое спасибо, спасибо большое, благодарю, отлично, прекрасно, очень хорошо",
+    "ja": "ありがとう, ありがとうございます, ありがとうございました, どうも, 助かります, 助かりました, "
+    "ね, です, ですね",
+    "zh": "谢谢, 谢谢你, 谢谢您, 多谢, 感谢, 非常好, 太好了, 很好",
+}  # fmt: skip
+"""What people say besides when an answer is enough for them, in the same form."""
+
 
 @lru_cache(TEXTS_KEPT)
 def is_listening(text: str) -> bool:
     """True if the text has words, and all of them are those of a listener, in whatever language and how often."""
     said = _plain(text)
     return bool(said) and _LISTENER.fullmatch(said) is not None
+
+
+@lru_cache(TEXTS_KEPT)
+def is_content(text: str) -> bool:
+    """True if the text has words, and all of them say that an answer is enough: a listener's, or thanks."""
+    said = _plain(text)
+    return bool(said) and _CONTENT.fullmatch(said) is not None
 
 
 @lru_cache(TEXTS_KEPT)
@@ -77,10 +105,9 @@ def _plain(text: str) -> str:
     return re.sub(r"\b(\w{2,3})\1+(\w?)\b", r"\1\1", said)
 
 
-def _pattern() -> re.Pattern[str]:
-    phrases = sorted(
-        {_plain(each) for told in BY_LANGUAGE.values() for each in told.split(",")}, key=len, reverse=True
-    )
+def _pattern(*languages: Mapping[str, str]) -> re.Pattern[str]:
+    told = [each for phrases in languages for each in phrases.values()]
+    phrases = sorted({_plain(each) for lines in told for each in lines.split(",")}, key=len, reverse=True)
     # A syllable alone is part of any word: "あ" and "お" are a listener's, and "あお" is blue.
     is_joined = {each: each[0] >= "\u3400" or (each[0] >= "\u3000" and len(each) > 1) for each in phrases}
     spaced = "|".join(re.escape(each) for each in phrases if not is_joined[each])
@@ -89,4 +116,4 @@ def _pattern() -> re.Pattern[str]:
     return re.compile(rf"{unit}(?: {unit})*")
 
 
-_LISTENER = _pattern()
+_LISTENER, _CONTENT = _pattern(BY_LANGUAGE), _pattern(BY_LANGUAGE, THANKS_BY_LANGUAGE)

@@ -437,8 +437,17 @@ class Coder:
         elif sign.action == "speak":
             if not side.own and at <= side.third_until + ROUND:
                 side.third_until = BEFORE[0]
+                if self._asks_for_more(sign):
+                    side.own.append(sign)
             else:
                 side.own.append(sign)
+
+    def _asks_for_more(self, speech: Span) -> bool:
+        """True if the words of what seems to close an exchange ask for something: they open another."""
+        if speech.known is None or not speech.words or speech.words in LISTENING:
+            return False
+        waited = min(speech.until[0] + WORDS_AFTER, speech.since[0] + longest_sound(self._timeline))
+        return speech.known[0] <= waited + ROUND or self._is_last(speech)
 
     def _begins_too(self, side: Side, sign: Span) -> bool:
         """True if a person begins to answer in the very instant of another's sign."""

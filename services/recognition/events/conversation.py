@@ -147,6 +147,7 @@ class Dialogue:
         since = speech.since
         in_turn, is_last = self.is_into_turn(since), self._scene.is_last(self.id, since, at)
         self.listener.understand(speech, at, in_turn=in_turn, is_last=is_last)
+        self.exchange.understand(speech, is_last=is_last)
 
     def person_gone(self, at: Seconds, until: Seconds) -> None:
         self.exchange.person_gone(at, until)

@@ -7,8 +7,10 @@ A turn of the person is the first of these that it can be:
 3. the answer to what the robot has asked somebody else, if that came after all that the person waits for;
 4. the late answer to a question whose limit has passed;
 5. more of a turn of the person's own that waits for the robot;
-6. a third turn, which closes the last exchange;
+6. a third turn, which closes the last exchange: an acknowledgment, an assessment or thanks (Schegloff 2007);
 7. a first turn, which opens a pair.
+
+By its place alone a speech may be a third turn or a first one. Its words tell, whenever they come.
 
 So nobody who answers slowly fails twice, by not answering and by a question that nobody has asked. The robot may
 begin a first turn while the person still speaks: it answers that person's pair, and asks. Half of all changes of
@@ -23,7 +25,9 @@ from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.events.adjacency_pair import INTERRUPTED, RESPONDING, AdjacencyPair
 from engage_hri.services.recognition.events.listener_sign import SignPart
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent, SpeechStart
+from engage_hri.services.recognition.events.presence import NEVER
 from engage_hri.services.recognition.events.scene import SessionScene
+from engage_hri.services.text.listening import is_content, says_words
 
 TURN_PATIENCE: Seconds = 12.0
 """Time after the robot's last word for which its unfinished turn still counts; longer than the silence after which
@@ -43,6 +47,8 @@ class Exchange:
         self._cut_into: list[tuple[AdjacencyPair, str]] = []
         """Pairs of the person whose first turn still goes on although the robot has answered with a first turn of its
         own, each with the block of that turn."""
+        self._closing: Seconds = NEVER
+        """Start of the speech that has been taken for a third turn without words."""
 
     def _new_pair(self) -> AdjacencyPair:
         return AdjacencyPair(
@@ -80,7 +86,7 @@ class Exchange:
             pair.forget_unanswered()
         elif pair.answers_late(action, at, confidence) or pair.human_goes_on(action, at):
             pass
-        elif action == "speak" and pair.is_third_turn(self._id, at):
+        elif action == "speak" and pair.is_third_turn(self._id, at) and self._may_close(at):
             pair.third_turn(at)
         elif pair.state == IDLE:
             event = OngoingEvent(
@@ -91,6 +97,22 @@ class Exchange:
             pair.human_asks(event, action)
         if until is not None:
             self.ends(action, until, by_robot=False)
+
+    def _may_close(self, since: Seconds) -> bool:
+        """True if a speech asks for nothing, as far as its words are known."""
+        words = self._writer.text_of(self._id, since)
+        self._closing = NEVER if says_words(words) else since
+        return not says_words(words) or is_content(words)
+
+    def understand(self, part: SignPart, *, is_last: bool) -> None:
+        """Take the words of a speech that seemed to close an exchange: if they ask for something it has opened one.
+
+        is_last: neither has begun to say anything since.
+        """
+        if part.since == self._closing and says_words(part.words):
+            self._closing = NEVER
+            if is_last and not is_content(part.words):
+                self.human_turn("speak", part.since, part.confidence, part.until)
 
     def take(self, part: SignPart, beside: Sequence[Seconds] = ()) -> None:
         """Take a part of a sign that turns out to be a turn: speech may be any, a gesture only an answer.
