@@ -47,8 +47,6 @@ def call(text: str, **more: object) -> dict[str, object]:
         "wait",
         "Halt!",
         "no",
-        "okay",
-        "yes",
         "attends un peu",
         "待って",
         "стой",
@@ -69,6 +67,19 @@ async def test_a_typed_line_stops_the_robot_and_is_its_answer(hub: MemoryHub, li
     assert (told.status, told.answer) == ("interrupted", "speak")
     assert [each.text for each in told.heard] == [line]
     assert spoke_on < 4.0
+
+
+@pytest.mark.parametrize("line", ["okay", "yes, yes", "mhm", "genau"])
+async def test_typed_words_of_a_listener_let_the_robot_go_on(hub: MemoryHub, line: str) -> None:
+    async with robot(hub) as client, perceive("ann", hub=hub) as ann:
+        await ann.look_at(ann.robot)
+        await asyncio.sleep(1.0)
+        performing = asyncio.create_task(perform_call(client, call(LONG), await_answer=False))
+        await asyncio.sleep(1.5)
+        await ann.type(line)
+        told = await performing
+
+    assert told.status == "done"
 
 
 @pytest.mark.parametrize(

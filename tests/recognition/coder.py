@@ -273,7 +273,7 @@ class Coder:
                 shown = shown if is_noise else [speech.since]
                 longest = longest_sound(self._timeline) if self._timeline.is_worded else BRIEF
                 is_brief = speech.seconds <= longest + ROUND
-                takes_floor = speech.is_line or (speech.words not in LISTENING if is_known else not is_brief)
+                takes_floor = speech.words not in LISTENING if is_known else not is_brief
                 if speech.until <= until and takes_floor and is_known and not is_in_time:
                     self._late.append(speech)
                 elif speech.until > until or takes_floor:
@@ -381,7 +381,7 @@ class Coder:
     def _interrupts(self, speech: Span, turn: Turn) -> bool:
         """True if a speech that is over within the robot's turn takes the floor, as far as is known in time."""
         if speech.is_line:
-            return True
+            return speech.words not in LISTENING
         is_open = turn.kind == "asks" or speech.seconds <= WORDS_WAIT + ROUND
         if is_open and self._is_known_in(speech, turn):
             return speech.words not in LISTENING

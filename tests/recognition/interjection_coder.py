@@ -137,7 +137,7 @@ def _reading(one: Into, timeline: Timeline, answered: float) -> set[str]:
     by_words = "backchannel" if speech.words in LISTENING else "interruption"
     outlasts = speech.until > one.until
     if speech.is_line:
-        return {"interruption"}
+        return {by_words}
     # In company it may wait until it is known to whom it is, and then has its words.
     is_waiting = len(timeline.people) > 1 and speech.words not in LISTENING
     taken = {"answer", "interruption"} if turn.is_aborted or one.is_beside or is_waiting else {"answer"}

@@ -18,6 +18,7 @@ from engage_hri.services.recognition.events.listener import Listener
 from engage_hri.services.recognition.events.listener_sign import SignPart
 from engage_hri.services.recognition.events.machine import IDLE, EventWriter, OngoingEvent
 from engage_hri.services.recognition.events.scene import SessionScene
+from engage_hri.services.text.listening import is_listening
 
 
 class Dialogue:
@@ -98,8 +99,8 @@ class Dialogue:
         self._speech, at = speech, speech.since
         if self.is_into_turn(at) or beside:
             self._writer.interject(self.id, at, "open", at)
-            # A line that was typed has no length by which it could be judged: who sends one has something to say.
-            if self._scene.lines.get(self.id) != at:
+            # A line that was typed has no length by which it could be judged: its words alone say what it is.
+            if self._scene.lines.get(self.id) != at or is_listening(speech.words):
                 self.listener.begins(speech, beside=not self.robot_holds_floor)
                 return
             self._writer.interject(self.id, at, "interruption", at)
