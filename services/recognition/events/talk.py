@@ -100,7 +100,10 @@ class Talk(KindRecognizer):
         if not self._line:
             return self._conversation.deadline, in_contact
         first, waits = self._undecided_first(), self._conversation.listener.waits_until
-        return waits if first is None else min(self._decided_at(first), waits), in_contact
+        if first is not None:
+            return min(self._decided_at(first), waits), in_contact
+        # What has waited for this very instant to be over may go on since, and nothing else may come that says so.
+        return waits if self._is_behind_others() else min(waits, self._writer.now), in_contact
 
     def pass_time(self, at: Seconds) -> None:
         if self._line:
