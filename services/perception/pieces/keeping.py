@@ -9,6 +9,9 @@ than `NUDGE`.
 A piece that is not seen is covered: it stays where it was, with little confidence. Where it lay the bare table is
 seen? Then somebody holds it, and it is left out; who remembers the world takes it for covered for a while
 (`CoveredObjects`).
+
+Half of a square is a triangle. So what is spotted beside a hand, where another piece of that color lies that is not
+seen, is that piece: no two lie in one place.
 """
 
 import math
@@ -78,7 +81,7 @@ class PieceKeeper:
 
     def feed(self, spotted: SpottedPieces, at: Seconds) -> tuple[Entity, ...]:
         """Take what is spotted in a picture. Returns all pieces as they are to be told."""
-        seen = {piece.id: piece for piece in spotted.pieces}
+        seen = {piece.id: piece for piece in spotted.pieces if not self._is_half(piece, spotted)}
         for id, kept in self._kept.items():
             if id in seen:
                 _see(kept, _turned_alike(kept, seen[id]), at, (*self._hands, *spotted.hands))
@@ -86,6 +89,15 @@ class PieceKeeper:
                 _miss(kept, at, is_bare=id in spotted.bare)
         self._hands = spotted.hands
         return tuple(self._entities())
+
+    def _is_half(self, piece: SpottedPiece, spotted: SpottedPieces) -> bool:
+        """True if it is what a hand leaves in view of another piece."""
+        if not any(math.dist((hand.x, hand.y), (piece.x, piece.y)) < HELD for hand in spotted.hands):
+            return False
+        missing = self._kept.keys() - {each.id for each in spotted.pieces} - set(spotted.bare)
+        color = self._kept[piece.id].form.color
+        covered = [kept.pose for id, kept in self._kept.items() if id in missing and kept.form.color == color]
+        return any(pose is not None and _is_near(piece, pose) for pose in covered)
 
     def _entities(self) -> Iterator[Entity]:
         for kept in self._kept.values():

@@ -10,7 +10,7 @@ from engage_hri.schemas.tables import PiecePose, Relation, relations
 from engage_hri.schemas.units import Stamp
 from engage_hri.schemas.world import Entity
 from engage_hri.services.perception.pieces.keeping import COVERED, PieceKeeper
-from engage_hri.services.perception.pieces.spotting import SpottedPiece, SpottedPieces
+from engage_hri.services.perception.pieces.spotting import SpottedHand, SpottedPiece, SpottedPieces
 from tests.perception.pieces.tables import GOALS, TABLE, Pose
 
 RATE = 5.0
@@ -22,11 +22,17 @@ class Shown:
     def __init__(self) -> None:
         self.keeper, self.number = PieceKeeper(TABLE), 0
 
-    def __call__(self, poses: dict[str, Pose], bare: tuple[str, ...] = (), seen: float = 1.0) -> dict[str, Entity]:
+    def __call__(
+        self,
+        poses: dict[str, Pose],
+        bare: tuple[str, ...] = (),
+        seen: float = 1.0,
+        hands: tuple[SpottedHand, ...] = (),
+    ) -> dict[str, Entity]:
         at = self.number / RATE
         self.number += 1
         pieces = tuple(SpottedPiece(id, *pose, seen) for id, pose in poses.items())
-        told = self.keeper.feed(SpottedPieces(at=Stamp("", at), pieces=pieces, bare=bare), at)
+        told = self.keeper.feed(SpottedPieces(at=Stamp("", at), pieces=pieces, bare=bare, hands=hands), at)
         return {each.id: each for each in told}
 
 
@@ -142,6 +148,23 @@ def test_a_piece_that_a_hand_covers_in_part_stays_where_it_was():
     assert told["rectangle"].position == before["rectangle"].position
     assert moved["rectangle"].position[0] == pytest.approx(x + 0.05)
     assert moved["rectangle"].confidence < 1.0
+
+
+def test_half_of_a_square_beside_a_hand_is_no_triangle():
+    square, shown = {"pink-square": (0.6, 0.0, 0.3)}, Shown()
+    half = {"pink-triangle": (0.61, 0.004, 1.2)}
+    hand = SpottedHand(0.64, 0.0, 0.97, 0.0)
+    for _ in range(3):
+        told = shown(square)
+    for _ in range(5):
+        told = shown(half, hands=(hand,))
+
+    assert [*told] == ["pink-square"]
+    assert told["pink-square"].position[:2] == (0.6, 0.0)
+    for _ in range(3):
+        told = shown(half)  # the hand has gone: it has laid the one there, and has the other
+
+    assert "pink-triangle" in told
 
 
 def test_a_piece_in_the_hand_is_left_out():
