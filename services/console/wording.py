@@ -103,7 +103,7 @@ def interjection(message: Interjection) -> str:
 
 
 def addressed(said: Utterance, floor: Floor | None, robot: str) -> str:
-    """Who says something, and to whom if it is not the robot alone: `ann (to ben)`. floor: as it was told last."""
+    """Words for who says something, and to whom if not to the robot alone: `ann (to ben)`. floor: as told last."""
     speeches = () if floor is None else (*floor.speeches, *floor.ended)
     own = [each for each in speeches if each.actor == said.actor and each.since.clock == said.began.clock]
     apart = [abs(each.since.seconds - said.began.seconds) for each in own]

@@ -182,5 +182,6 @@ def test_smart_turn_hears_who_searches_for_a_word():
         listening.hear(np.concatenate([voice(text), np.zeros(round(0.3 * RATE), np.int16)]))
         return listening.end().confidence
 
-    # eSpeak NG ends whatever it says as if it were done, so it tells no more than this.
-    assert finished("well, um") < 0.5 < finished("what is that?")
+    # eSpeak NG ends whatever it says as if it were done, so it tells no more than this. The model computes in 8 bits,
+    # and its answer to shorter questions is 0.06 on one processor and above 0.5 on another.
+    assert finished("well, um") < 0.5 < finished("Where is the cup?")

@@ -256,8 +256,7 @@ class Emission:
             return
         source = next((id for id, parts in self.parts.items() if parts.gaze == first.id), first.id)
         if not self.rewriting.is_timed(source, self.named):
-            seen = SyncRef(behavior=BLOCK_ITSELF, sync="start", offset=self.before.seen_after)
-            rested = after(str(seen), f"{first.id}:start")
+            rested = after(str(SyncRef("", BLOCK_ITSELF, "start", 0, self.before.seen_after)), f"{first.id}:start")
             self.constraints.append(Constraint(id=self.names.fresh("eyes-rest"), operators=(rested,)))
 
     def _speeches(self) -> list[str]:

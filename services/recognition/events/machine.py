@@ -165,9 +165,9 @@ class EventWriter:
         """Questions to several people that one of them, or somebody else, has answered: to be told to the rest."""
 
     def take(self) -> list[Effect]:
-        """Return the effects since the last call."""
+        """Return the effects since the last call: what people have said first, for the rest follows from that."""
         taken, self.effects = self.effects, []
-        return taken
+        return sorted(taken, key=lambda each: not isinstance(each, Interjection))
 
     def stamp(self, at: Seconds) -> Stamp:
         return Stamp(self._clock, at)
