@@ -414,9 +414,10 @@ class Intake:
         counted = [change for change in changes if isinstance(change, PersonForgotten) or not change.retold]
         name = self._identities.name
         busy = {name(id) for id in self._recognizer.session.busy}
+        here = {name(id): each for id, each in self._recognizer.presences().items()}
         contacts = {name(id): much for id, much in self._recognizer.contacts().items()}
         heads = {name(id): head for id, head in self._recognizer.heads().items()}
-        self._statistics.feed(counted, busy, self._now, contacts, heads)
+        self._statistics.feed(counted, busy, self._now, contacts, heads, here)
         for statistics in self._statistics.told(self._now):
             if statistics.actor != "all":  # a person with this id would be taken for everybody
                 out.append(PublishMessage(keys.statistics(statistics.actor or "all"), statistics))

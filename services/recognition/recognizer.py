@@ -134,6 +134,14 @@ class Recognizer:
         until = now if settled > now else math.nextafter(settled, -math.inf)
         return self._told([*results, *self.session.advance(until)])
 
+    def presences(self) -> dict[str, bool]:
+        """Whether each person is here who has come or left since the last call. A head that left attends no more."""
+        changed = self.session.presences()
+        for id, is_here in changed.items():
+            if not is_here:
+                self._heads.pop(id, None)
+        return changed
+
     def contacts(self) -> dict[str, Probability | None]:
         """Contact of each person with the robot, of those for whom it may have changed since the last call.
 

@@ -5,10 +5,13 @@ from itertools import pairwise
 import pytest
 from msgspec.structs import replace
 
+from engage_hri.schemas.perception import ActorLost
 from engage_hri.schemas.recognition import ConnectionEvent, Statistics
 from engage_hri.schemas.units import Probability, Seconds
 from engage_hri.services.recognition.config import RecognitionConfig
 from engage_hri.services.recognition.statistics.published import PublishedStatistics
+from tests.recognition.heard_log import HeardLog
+from tests.recognition.observations import ROBOT, stamp, world
 from tests.recognition.test_statistics import event, table_2_1
 
 PAUSE: Seconds = 70.0
@@ -204,3 +207,24 @@ def test_a_look_in_passing_engages_nobody():
 def test_who_looks_again_is_engaged_if_the_first_look_was_a_while_ago():
     assert looking((3.0, 3.4), (6.0, 12.0))[2] == (7.0, "engaged"), "the share of contact has grown again"
     assert looking((3.0, 3.4), (4.0, 12.0))[2] == (4.5, "engaged")
+
+
+@pytest.mark.parametrize("is_told", [True, False])
+def test_who_has_left_is_disengaged_as_soon_as_that_is_known(*, is_told: bool):
+    """A face that is back soon had not left: that it has is known after two seconds."""
+    log = HeardLog(4.0)
+    log.take(world("ann"), 0.0)
+    log.found("ann", 0.0)
+    log.begins("ann", "look", 1.0, ROBOT)
+    log.until(12.0)
+    log.take(ActorLost(actor="ann", at=stamp(12.0), left=is_told), 12.0)
+    log.until(20.0)
+    log.found("ann", 20.0)
+    log.begins("ann", "look", 20.5, ROBOT)
+    log.until(30.0)
+
+    told = [each for each in log.told if isinstance(each, Statistics) and each.actor == "ann"]
+    levels = [each for before, each in pairwise(told) if before.level != each.level]
+    assert [each.level for each in levels] == ["engaged", "disengaged", "engaging", "engaged"]
+    assert levels[1].at.seconds == pytest.approx(14.0, abs=0.01)
+    assert (levels[1].engagement, levels[1].reasons) == (0.0, ("has left",))

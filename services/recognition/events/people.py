@@ -38,6 +38,7 @@ class People:
         self._contacts: dict[str, Probability | None] = {}
         """Contact of each person with the robot."""
         self._new_contacts: dict[str, Probability | None] = {}
+        self._new_presences: dict[str, bool] = {}
         """Those that have changed since somebody has asked for them."""
         self._silences = 0
         """`scene.silences` when the deadlines of all were last updated."""
@@ -97,6 +98,7 @@ class People:
         self._may_go_on = True
         self._contacts.pop(id, None)
         self._new_contacts.pop(id, None)
+        self._new_presences.pop(id, None)
         del self.persons[id]
         self._writer.effects.append(PersonForgotten(id))
         self._follow(now)
@@ -135,6 +137,11 @@ class People:
         self._scene.stops(person.id, at)
         self._update(fresh)
         self._follow(at)
+
+    def presences(self) -> dict[str, bool]:
+        """Whether each person is here who has come, or left, since the last call."""
+        changed, self._new_presences = self._new_presences, {}
+        return changed
 
     def contacts(self) -> dict[str, Probability | None]:
         """Contact of each person for whom it has changed since the last call."""
@@ -255,10 +262,12 @@ class People:
         if was_here and not here:
             del self._here[id]
             scene.present.discard(id)
+            self._new_presences[id] = False
             self._note(person, presence.left_at)
         elif here and not was_here:
             self._here[id] = person
             scene.present.add(id)
+            self._new_presences[id] = True
             person.talk.person_back()
             self._here = dict(sorted(self._here.items(), key=lambda one: one[1].number))
 

@@ -79,6 +79,7 @@ class Session:
         self.busy: Set[str] = self.scene.acting
         """Persons with a task in hand."""
         self.contacts = self._people.contacts
+        self.presences = self._people.presences
         """Tells contact with each person for whom it has changed since the last call."""
         self.remember = self._writer.remember
         """Takes an interjection that a former life has told, so that it is not told again."""

@@ -132,6 +132,7 @@ class Engagement:
         self.apart_since: Seconds = -inf
         """Time at which the last contact ended."""
         self.level_since: Seconds = -inf
+        self._has_left = False
 
     def resume(self, former: Statistics) -> None:
         """Go on from what a former life has told: all that goes on now went on meanwhile."""
@@ -151,6 +152,12 @@ class Engagement:
         if (self.contact.now or 0.0) >= IN_CONTACT > (much or 0.0):
             self.apart_since = at
         self.contact.change(much, at)
+
+    def comes_or_leaves(self, at: Seconds, *, is_here: bool) -> None:
+        """Take it that the person is here, or has left: who comes back begins anew with the contact of then."""
+        self._has_left = not is_here
+        if not is_here:
+            self.touch(None, at)
 
     def update(self, now: Seconds, *, busy: bool) -> EngagementEstimate:
         """Update the estimate, and return it. busy: True freezes it as it was when the task began."""
@@ -181,6 +188,9 @@ class Engagement:
         return "value" if drifts else ""
 
     def _estimate(self, now: Seconds) -> EngagementEstimate:
+        if self._has_left:
+            level = next_level(self.estimate.level, 0.0, self._config, in_contact=False, lasts=False)
+            return EngagementEstimate(0.0, level, ("has left",))
         known: list[Probability] = []
         reasons: list[str] = []
         if self.contact.now is not None:

@@ -88,13 +88,14 @@ class PublishedStatistics:
         now: Seconds,
         contacts: Mapping[str, Probability | None] = {},
         heads: Mapping[str, HeadHabit] = {},
+        here: Mapping[str, bool] = {},
     ) -> None:
         """Count changes, in their order.
 
         busy: persons with a task in hand. contacts: how much of a contact there is now, where that may have changed.
-        heads: what is known of people's heads, where that has changed.
+        heads: what is known of people's heads, where that has changed. here: who has come, and (false) who has left.
         """
-        if busy == self._busy and not (changes or contacts or heads or self._held_busy):
+        if busy == self._busy and not (changes or contacts or heads or here or self._held_busy):
             return
         for actor, head in heads.items():
             self._actors[actor].head, self._actors[actor].is_new = head, True
@@ -105,6 +106,9 @@ class PublishedStatistics:
             if one.engagement.contact.now != much:
                 one.engagement.touch(much, now)
                 self._changed.add(actor)
+        for actor, is_here in here.items():
+            self._actors[actor].engagement.comes_or_leaves(now, is_here=is_here)
+            self._changed.add(actor)
         for change in changes:
             if isinstance(change, PersonForgotten):
                 self._actors.pop(change.actor, None)
