@@ -93,6 +93,12 @@ COMPLAINTS = 100
 Output = PublishMessage | WithdrawStates | AnswerRequest | TellMistake
 
 
+def _own_answer(event: ConnectionEvent) -> ConnectionEvent:
+    """Take an answer in a person's place for their own, if it turns out to be that."""
+    is_own = event.state == "preempted" and event.answered_by == event.responder != ""
+    return replace(event, state="completed", answered_by="") if is_own else event
+
+
 def reads(message: object) -> TypeGuard[Content]:
     """True for a message that recognition takes into account."""
     return isinstance(message, _CONTENT)
@@ -257,7 +263,7 @@ class Intake:
         """Tell what was told of a person by another name by this one, as far as it is remembered."""
         at, out = Stamp(self._clock.name, self._now), self._outputs
         for id, before in tuple(self._told.items()):
-            event = self._identities.outward(self._identities.inward(before))
+            event = _own_answer(self._identities.outward(self._identities.inward(before)))
             if event is not before and event != before:
                 event = self._told[id] = replace(event, at=at, retold=True)
                 out.append(PublishMessage(keys.connection_event(event.person(self._robot), event.kind), event))

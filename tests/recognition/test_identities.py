@@ -42,6 +42,7 @@ from engage_hri.services.runtime.intake import (
     WithdrawStates,
 )
 from tests.random_cases import share_of
+from tests.recognition.heard_log import HeardLog
 from tests.recognition.kept import kinds
 from tests.recognition.observations import PIECES, ROBOT, request_event, stamp, world
 from tests.simulation.party_play import Play
@@ -130,6 +131,33 @@ def test_an_open_event_goes_on_under_the_joined_id() -> None:
     told.take(2.0, ActionBegan(actor=ROBOT, action="look", at=stamp(2.0), targets=("ann",), behavior="b:look"))
 
     assert told.lives() == [("started", "ann", ROBOT), ("succeeded", "ann", ROBOT)]
+
+
+def test_who_has_answered_by_another_id_has_answered() -> None:
+    """A face without a name answers what the robot has asked Ann; that it is hers is known later."""
+    log = HeardLog(4.0)
+    log.take(people_at({"ann": PLACES["ann"], "face_3": PLACES["ben"]}), 0.0)
+    for actor in ("ann", "face_3"):
+        log.found(actor, 0.0)
+    log.begins("face_3", "look", 0.5, ROBOT)
+    log.take(request_event("adjacency_pair", 1.0, request="r", block="b", turn="t", responder="ann"), 1.0)
+    log.begins(ROBOT, "speak", 1.0, behavior="b:s")
+    log.ends(ROBOT, "speak", 2.0, behavior="b:s")
+    signal = TurnSignal(id="e", turn="t", signal="ended", actor="ann")
+    log.take(SignalTurn(id="t/ended", requester="realizer", signal=signal, at=stamp(2.0), block="b"), 2.0)
+    log.begins("face_3", "speak", 2.5)
+    log.ends("face_3", "speak", 3.2)
+    log.until(5.0)
+    log.take(ActorFound(actor="face_3", at=stamp(5.0), same_as="ann"), 5.0)
+    log.until(6.0)
+
+    pair = [each for each in log.events if each.kind == "adjacency_pair" and each.initiator == ROBOT]
+    told = [(each.state, each.responder, each.answered_by, each.delay, each.retold) for each in pair]
+    assert told == [
+        ("started", "ann", "", None, False),
+        ("preempted", "ann", "face_3", 0.5, False),
+        ("completed", "ann", "", 0.5, True),
+    ]
 
 
 def test_who_is_named_late_is_told_of_again() -> None:
