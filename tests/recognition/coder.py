@@ -448,9 +448,9 @@ class Coder:
         """True if the words of what seems to close an exchange ask for something: they open another."""
         if speech.known is None or not speech.words or speech.words in LISTENING:
             return False
-        # A voice that goes on when the answer is over is not waited for: the robot may go on, too.
         into = [t.until for t in self._timeline.turns if speech.who in t.to and t.since < speech.since < t.until]
-        if into:
+        # A voice that goes on when the answer is over is not waited for, unless it may be for somebody else.
+        if into and (self._timeline.tells == "early" or not company(speech, self._timeline)):
             return speech.known < into[-1] or self._is_last(speech)
         waited = min(speech.until[0] + WORDS_AFTER, speech.since[0] + longest_sound(self._timeline))
         return speech.known[0] <= waited + ROUND or self._is_last(speech)
