@@ -231,7 +231,7 @@ class Talk(KindRecognizer):
         known, over = speech.words, (at if speech.until is None else speech.until) + WORDS_AFTER
         is_in_time = at <= max(since + WORDS_WAIT, over if speech.is_beside else since) + ROUNDING
         # What the line holds may have ended the robot's turn, so that only the speech knows that it is not into that.
-        is_late = (speech.is_into_turn or speech.is_beside) and self._is_into_words(speech) and not is_in_time
+        is_late = (speech.is_into_turn or speech.is_beside) and self._may_be_for_robot(speech) and not is_in_time
         if speech.sound == "unsure" and says_words(known) and not is_late:
             self._scene.decide(speech, at)
         # What has been waited for was known when the speech began. The line waits for no words of who is alone.
@@ -435,9 +435,13 @@ class Talk(KindRecognizer):
 
     def _is_into_words(self, speech: OwnSpeech) -> bool:
         """True of what is for the robot, as far as is known, and into its words: the conversation says what it is."""
-        may_be = speech.faces.most(speech.since) in ("", self._scene.robot)
         is_into_words = speech.is_beside or self._conversation.is_into_turn(speech.since)
-        return is_into_words and (may_be if speech.to is None else speech.is_to(self._scene.robot))
+        return is_into_words and self._may_be_for_robot(speech)
+
+    def _may_be_for_robot(self, speech: OwnSpeech) -> bool:
+        """True of what is for the robot, as far as is known."""
+        robot = self._scene.robot
+        return speech.faces.most(speech.since) in ("", robot) if speech.to is None else speech.is_to(robot)
 
     def _is_known(self, speech: OwnSpeech) -> bool:
         """True if it is known to whom a speech in line is, that it is no cough, and who else speaks in that instant.
