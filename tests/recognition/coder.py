@@ -451,7 +451,7 @@ class Coder:
         into = [t.until for t in self._timeline.turns if speech.who in t.to and t.since < speech.since < t.until]
         # A voice that goes on when the answer is over is not waited for, unless it may be for somebody else.
         if into and (self._timeline.tells == "early" or not company(speech, self._timeline)):
-            return speech.known < into[-1] or self._is_last(speech)
+            return speech.known > into[-1] and self._is_last(speech)  # else it is of that exchange
         waited = min(speech.until[0] + WORDS_AFTER, speech.since[0] + longest_sound(self._timeline))
         return speech.known[0] <= waited + ROUND or self._is_last(speech)
 
