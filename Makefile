@@ -15,7 +15,7 @@ CHOSEN := -m "not long"
 demo: $(DEMO)
 	@$(BIN)/engage demo $(ARGS)
 
-# Some six minutes on two processors: all but the long share (tests/long_share.py). mypy keeps one processor busy for as long as
+# Three to six minutes on two processors: all but the long share (tests/long_share.py). mypy keeps one processor busy for as long as
 # others would wait for it: it runs beside the tests.
 test: style
 	@$(BIN)/mypy --no-error-summary & types=$$!; \
