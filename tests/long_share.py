@@ -27,6 +27,8 @@ TESTS = Path(__file__).parent
 
 LONG = {
     "lab": "several machines on this one: it needs root, and waits for routers that start",
+    "frameworks/test_livekit.py": "it needs a package that few have; `make test-frameworks` has it",
+    "frameworks/test_pipecat.py": "the same",
     "test_wheel.py": "it builds the wheel and installs it in environments of their own",
     "docs/test_site.py": "it builds the whole site",
     "generation/test_again.py": "many fragments in many lives, each decided twice",
@@ -302,6 +304,9 @@ LONG_TESTS = {
     "simulation/test_party.py": {
         "test_they_talk_over_each_other_as_people_do": "an hour of talk, counted",
         "test_what_is_said_to_others_is_not_the_robots_and_its_questions_are_answered": "two hours of talk, counted",
+    },
+    "frameworks/test_realtime.py": {
+        "test_events_are_those_of_the_api_by_its_own_types": "it needs a package that few have",
     },
     "study/test_permutation.py": {
         "test_many_divisions_of_two_samples_are_tested_by_drawing": "so many divisions are drawn",

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.long_share import may_have_long
 from tests.skips import DESK, LISTED, amiss, listed
 
 ROOT = Path(__file__).parents[1]
@@ -120,3 +121,18 @@ def test_a_machine_of_ci_without_chromium_is_red(tmp_path: Path) -> None:
 
     assert code == 1
     assert "expects 0 on `ci`: there is no Chromium on this machine" in told
+
+
+def test_what_is_always_skipped_in_ci_is_in_a_file_that_its_second_run_loads() -> None:
+    """`.ci/run` asks for the long share alone, and files without a long test are not loaded then."""
+    always = [reason for reason, numbers in listed(LISTED.read_text()).items() if "ci" in numbers]
+    reasons = re.compile(r'(?:reason=|skip\(|skipif\(.*)f?"(.*?)"')
+    found = {
+        path: [
+            told for told in reasons.findall(path.read_text("utf-8")) for each in always if re.fullmatch(each, told)
+        ]
+        for path in LISTED.parent.rglob("test_*.py")
+    }
+
+    assert any(found.values())
+    assert [path.name for path, some in found.items() if some and not may_have_long(path)] == []
