@@ -125,14 +125,10 @@ def test_a_machine_of_ci_without_chromium_is_red(tmp_path: Path) -> None:
 
 def test_what_is_always_skipped_in_ci_is_in_a_file_that_its_second_run_loads() -> None:
     """`.ci/run` asks for the long share alone, and files without a long test are not loaded then."""
-    always = [reason for reason, numbers in listed(LISTED.read_text()).items() if "ci" in numbers]
-    reasons = re.compile(r'(?:reason=|skip\(|skipif\(.*)f?"(.*?)"')
-    found = {
-        path: [
-            told for told in reasons.findall(path.read_text("utf-8")) for each in always if re.fullmatch(each, told)
-        ]
-        for path in LISTED.parent.rglob("test_*.py")
-    }
+    always = re.compile("|".join(reason for reason, numbers in listed(LISTED.read_text()).items() if "ci" in numbers))
+    reason = re.compile(r'(?:reason=|skip\(|skipif\(.*)f?"(.*?)"')
+    files = {path: reason.findall(path.read_text("utf-8")) for path in LISTED.parent.rglob("test_*.py")}
+    found = [path for path, told in files.items() if any(map(always.fullmatch, told))]
 
-    assert any(found.values())
-    assert [path.name for path, some in found.items() if some and not may_have_long(path)] == []
+    assert found
+    assert [path.name for path in found if not may_have_long(path)] == []
