@@ -135,7 +135,7 @@ class Recognizer:
         return self._told([*results, *self.session.advance(until)])
 
     def presences(self) -> dict[str, bool]:
-        """Whether each person is here who has come or left since the last call. A head that left attends no more."""
+        """Presence of who has come, or left, since the last call: true if here. A head that left attends no more."""
         changed = self.session.presences()
         for id, is_here in changed.items():
             if not is_here:

@@ -139,7 +139,7 @@ class People:
         self._follow(at)
 
     def presences(self) -> dict[str, bool]:
-        """Whether each person is here who has come, or left, since the last call."""
+        """Presence of each person who has come, or left, since the last call: true if they are here."""
         changed, self._new_presences = self._new_presences, {}
         return changed
 
