@@ -74,17 +74,24 @@ def test_what_comes_twice_changes_nothing(stream, seed):
 def independent(draw):
     """The same observations in two orders: each person's own in order, those of others before or after.
 
-    What everybody is concerned with (the robot's actions, head, blocks and turns) has cells of its own.
+    What everybody is concerned with (the robot's actions, head, blocks and turns) has cells of its own. So has who
+    leaves or comes back: to whom others speak depends on who is there.
     """
     chance = Chance(random.Random(draw(st.integers(0, 10**6))).choice)
     one: Stream = []
     other: Stream = []
+    lost: set[str] = set()
     for second in range(draw(st.integers(1, 60))):
         cell = [(second + number * CELL / 8, chance.observation(second + number * CELL / 8)) for number in range(8)]
         cell = [(at, _own(it)) for at, it in cell]
         whose = {person: [it for it in cell if concerns(it[1]) == person] for person in PEOPLE}
         common = [it for it in cell if concerns(it[1]) == ""]
-        if common and chance.pick((True, False)):
+        if any(isinstance(it, ActorLost) or concerns(it) in lost for _, it in cell):
+            one += cell
+            other += cell
+            for _, it in cell:
+                (lost.add if isinstance(it, ActorLost) else lost.discard)(concerns(it))
+        elif common and chance.pick((True, False)):
             one += common
             other += common
         else:
